@@ -1,0 +1,58 @@
+"""Parcels and streets, generated together on real land boundaries.
+
+>>> import urban_processing as up
+>>> layout = up.cogenerate("sample_data/wandsworth.gpkg", parcels=500)  # doctest: +SKIP
+>>> layout.save("layout.gpkg")  # doctest: +SKIP
+
+Names are loaded when they are first used, so that importing the package is quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from urban_processing.version import __version__
+
+if TYPE_CHECKING:
+    from urban_processing import errors
+    from urban_processing.api import cogenerate
+    from urban_processing.io.files import read_layout
+    from urban_processing.io.frames import GeoLayout
+    from urban_processing.params.cogenerate import CogenerateParams, Preset, StreetPattern
+
+_HOME = {
+    "CogenerateParams": "urban_processing.params.cogenerate",
+    "GeoLayout": "urban_processing.io.frames",
+    "Preset": "urban_processing.params.cogenerate",
+    "StreetPattern": "urban_processing.params.cogenerate",
+    "cogenerate": "urban_processing.api",
+    "read_layout": "urban_processing.io.files",
+}
+
+__all__ = [
+    "CogenerateParams",
+    "GeoLayout",
+    "Preset",
+    "StreetPattern",
+    "__version__",
+    "cogenerate",
+    "errors",
+    "read_layout",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home on first use."""
+    if name == "errors":
+        return importlib.import_module("urban_processing.errors")
+    if name not in _HOME:
+        raise AttributeError(f"module 'urban_processing' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted(__all__)

@@ -1,0 +1,90 @@
+"""The declaration of `cogenerate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from urban_processing.algorithms.spec import (
+    AlgorithmSpec,
+    Estimate,
+    Input,
+    InputKind,
+    Output,
+    OutputKind,
+)
+from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.progress import Progress
+
+
+def _run(
+    inputs: Mapping[str, Any], params: CogenerateParams, progress: Progress
+) -> Mapping[str, Any]:
+    from urban_processing.pipelines.cogenerate import cogenerate
+
+    return {"output": cogenerate(inputs["boundary"], params, progress)}
+
+
+def _estimate(inputs: Mapping[str, Any], params: CogenerateParams) -> Estimate:
+    from urban_processing.pipelines.cogenerate import estimate
+
+    return estimate(inputs["boundary"], params)
+
+
+COGENERATE = AlgorithmSpec(
+    name="cogenerate",
+    title="Co-generate parcels and streets",
+    group="Layout",
+    summary="Divide land into well-shaped parcels, all reached by one connected street network.",
+    description=(
+        "The land is cut in two again and again, along streamlines of a cross field that follows "
+        "its boundary, until a parcel cannot be cut without going below the smallest area. After "
+        "each level of cuts, streets are added along parcel boundaries so that every parcel is "
+        "reached and the network stays connected.\n\n"
+        "Each connected part of the land gets a layout and a network of its own. Holes stay "
+        "empty. The rim of the land is street."
+    ),
+    params=CogenerateParams,
+    inputs=(
+        Input(
+            name="boundary",
+            kind=InputKind.BOUNDARY,
+            help="The land: a file with polygons, of any vector format.",
+        ),
+        Input(
+            name="corners",
+            kind=InputKind.CORNER_POINTS,
+            help="Points near the boundary that are to count as corners of a freeform land; "
+            "by default corners are found by angle.",
+            required=False,
+        ),
+    ),
+    outputs=(
+        Output(
+            name="output",
+            kind=OutputKind.LAYOUT,
+            help="The layout: a GeoPackage with parcels, streets, junctions, metrics and styles.",
+            required=True,
+        ),
+        Output(name="plot", kind=OutputKind.MAP, help="A map of the layout.", of="output"),
+        Output(
+            name="export",
+            kind=OutputKind.EXPORT,
+            help="A folder for one plain file of each layer.",
+            of="output",
+        ),
+    ),
+    run=_run,
+    estimate=_estimate,
+    references=(
+        "Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban "
+        "modeling. Sections 3, 4 and 6.",
+        "Yang, Y.-L. et al. (2013). Urban pattern: layout design by hierarchical domain "
+        "splitting. Section 5.",
+    ),
+    examples=(
+        "sample_data/wandsworth.gpkg -o layout.gpkg --parcels 500 --plot layout.png",
+        "land.shp -o layout.gpkg --min-area 800 --pattern cul-de-sac",
+        '--place "Schaan, Liechtenstein" -o schaan.gpkg --min-area 600',
+    ),
+)

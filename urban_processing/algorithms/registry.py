@@ -1,0 +1,39 @@
+"""The list of algorithms."""
+
+from __future__ import annotations
+
+import difflib
+
+from urban_processing.algorithms.cogenerate import COGENERATE
+from urban_processing.algorithms.spec import AlgorithmSpec
+from urban_processing.errors import ParameterError
+
+_SPECS = (COGENERATE,)
+
+
+def specs() -> tuple[AlgorithmSpec, ...]:
+    """Return all algorithms in the order in which shells show them."""
+    return _SPECS
+
+
+def get(name: str) -> AlgorithmSpec:
+    """Return the algorithm of that name.
+
+    Raises
+    ------
+    ParameterError
+        If there is none.
+
+    Examples
+    --------
+    >>> get("cogenerate").title
+    'Co-generate parcels and streets'
+    """
+    known = {spec.name: spec for spec in specs()}
+    if name in known:
+        return known[name]
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f" Did you mean {close[0]}?" if close else ""
+    raise ParameterError(
+        f"There is no algorithm {name!r}.{hint} There are: {', '.join(known)}."
+    )

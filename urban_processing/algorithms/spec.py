@@ -1,0 +1,167 @@
+"""`AlgorithmSpec`: all that a shell needs to offer an algorithm.
+
+The command line, the QGIS toolbox, the JSON Schema and the reference page are made from it;
+none of them names a parameter a second time.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from urban_processing.params.base import ParamField, Params
+from urban_processing.progress import Progress
+
+
+class InputKind(enum.StrEnum):
+    """What an algorithm reads; a shell knows how to ask for each kind."""
+
+    BOUNDARY = "boundary"
+    """Polygons of the land; handed to the algorithm as a `Site`."""
+    CORNER_POINTS = "corner points"
+    """Points on the boundary that count as corners of the land; they become a part of the
+    `Site` of the boundary, not a value of their own."""
+    LAYOUT = "layout"
+    """A layout made before; handed over as a `Layout`."""
+
+
+class OutputKind(enum.StrEnum):
+    """What an algorithm makes; a shell knows how to store each kind."""
+
+    LAYOUT = "layout"
+    """A `Layout`: a GeoPackage on the command line, sinks in QGIS."""
+    MAP = "map"
+    """A picture of the layout named in `Output.of`."""
+    EXPORT = "export"
+    """A folder of plain files, one for each layer of the layout named in `Output.of`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Input:
+    """One thing that an algorithm reads.
+
+    Parameters
+    ----------
+    name
+        Its key in the mapping given to `AlgorithmSpec.run`.
+    kind
+        What it is.
+    help
+        One sentence for the user.
+    required
+        Whether the algorithm runs without it.
+    """
+
+    name: str
+    kind: InputKind
+    help: str
+    required: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """One thing that an algorithm makes.
+
+    Parameters
+    ----------
+    name
+        Its key in the mapping that `AlgorithmSpec.run` returns, if `of` is empty.
+    kind
+        What it is.
+    help
+        One sentence for the user.
+    required
+        Whether the user has to say where it goes.
+    of
+        Name of the output that this one is another view of, as a map is of a layout; the
+        shell makes it, the algorithm does not.
+    """
+
+    name: str
+    kind: OutputKind
+    help: str
+    required: bool = False
+    of: str = ""
+
+
+class Estimate(Protocol):
+    """What a run will make and take."""
+
+    @property
+    def parcels(self) -> int:
+        """Number of parcels."""
+        ...
+
+    @property
+    def seconds(self) -> float:
+        """Time on one core."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlgorithmSpec:
+    """One algorithm, declared.
+
+    Parameters
+    ----------
+    name
+        Stable lowercase identifier: the command, the QGIS id, the name in provenance.
+    title
+        What a toolbox shows.
+    group
+        Where a toolbox shows it.
+    summary
+        One sentence.
+    description
+        Some paragraphs, separated by empty lines.
+    params
+        The parameter class.
+    inputs, outputs
+        What it reads and makes, in the order of asking.
+    run
+        ``run(inputs, params, progress)`` returns the outputs by name. It imports the engine
+        when it is called, so that a list of algorithms costs nothing.
+    estimate
+        ``estimate(inputs, params)``, where a run may be long.
+    references
+        The sources, as a reader would look them up.
+    examples
+        Arguments of the command line that work, without the program and the name.
+    """
+
+    name: str
+    title: str
+    group: str
+    summary: str
+    description: str
+    params: type[Params]
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    run: Callable[[Mapping[str, Any], Any, Progress], Mapping[str, Any]]
+    estimate: Callable[[Mapping[str, Any], Any], Estimate] | None = None
+    references: tuple[str, ...] = ()
+    examples: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        fields = [field.name for field in self.params.fields()]
+        names = [item.name for item in (*self.inputs, *self.outputs)] + fields
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
+        made = {output.name for output in self.outputs if not output.of}
+        lost = [output.name for output in self.outputs if output.of and output.of not in made]
+        if lost:
+            raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")
+
+    def panels(self) -> dict[str, tuple[ParamField, ...]]:
+        """Return the parameters by panel, as shells show them; the advanced ones come last."""
+        panels: dict[str, list[ParamField]] = {}
+        for field in self.params.fields():
+            if not field.param.advanced:
+                panels.setdefault(field.param.group or "General", []).append(field)
+        advanced = [field for field in self.params.fields() if field.param.advanced]
+        if advanced:
+            panels["Advanced"] = advanced
+        return {panel: tuple(fields) for panel, fields in panels.items()}

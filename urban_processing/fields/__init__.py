@@ -1,0 +1,1 @@
+"""Cross fields of parcels and the streamlines traced along them."""

@@ -1,0 +1,24 @@
+"""Random numbers by hashing, so that a parcel's draws depend on its own path alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+UintArray = npt.NDArray[np.uint64]
+
+
+def splitmix64(values: UintArray) -> UintArray:
+    """Mix 64-bit integers (Steele et al. 2014, SplitMix); vectorised, no state."""
+    z = values + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+def uniform(seed: int, lineage: UintArray, n_draws: int) -> npt.NDArray[np.float64]:
+    """(len(lineage), n_draws) numbers in [0, 1), a function of seed and lineage alone."""
+    key = splitmix64(np.atleast_1d(np.array(seed % 2**64, dtype=np.uint64)))
+    start = splitmix64(lineage ^ key)
+    draws = splitmix64(start[:, None] + np.arange(1, n_draws + 1, dtype=np.uint64))
+    return np.asarray((draws >> np.uint64(11)).astype(np.float64) * 2.0**-53)

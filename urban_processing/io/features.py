@@ -1,0 +1,197 @@
+"""Features out of files and frames, as geometries and a CRS, with everything that is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import pyogrio
+import pyproj
+import shapely
+from pyogrio.errors import DataLayerError, DataSourceError, FieldError, GeometryError
+
+from urban_processing.errors import BoundaryError, DependencyError
+from urban_processing.io.crs import horizontal
+
+if TYPE_CHECKING:
+    import geopandas
+
+Source: TypeAlias = "str | PathLike[str] | geopandas.GeoDataFrame | geopandas.GeoSeries | Any"
+"""A path, a GeoDataFrame, a GeoSeries, a shapely geometry or a sequence of them."""
+
+PARQUET = (".parquet", ".geoparquet", ".pq")
+_PREFERRED_LAYER = "boundary"
+
+
+@dataclass(frozen=True)
+class Features:
+    """Geometries as given.
+
+    Parameters
+    ----------
+    geometry
+        (n,) shapely geometries or None.
+    crs
+        Horizontal CRS, None where the source has none.
+    name
+        What to call the source in messages.
+    bare
+        Whether the source cannot carry a CRS (shapely geometries).
+    """
+
+    geometry: npt.NDArray[np.object_]
+    crs: pyproj.CRS | None
+    name: str
+    bare: bool = False
+
+
+def read_features(
+    source: Source, *, layer: str | None = None, where: str | None = None
+) -> Features:
+    """Read the features of a file, or take those of a frame or of shapely geometries.
+
+    Parameters
+    ----------
+    source
+        Anything that GDAL reads (also zipped, or a URL), GeoParquet, or geometries.
+    layer
+        Layer of a file that has several.
+    where
+        Filter on attributes, as after WHERE in SQL.
+
+    Raises
+    ------
+    BoundaryError
+        If the file or layer is missing, cannot be read, or the choice is ambiguous.
+    """
+    if isinstance(source, str | PathLike):
+        path = fspath(source)
+        if path.lower().endswith(PARQUET):
+            return _read_parquet(path, layer, where)
+        return _read_file(path, layer, where)
+    if layer is not None or where is not None:
+        raise BoundaryError(
+            "layer and where choose features of a file; select the rows of a frame before."
+        )
+    geometry = getattr(source, "geometry", None)
+    if geometry is not None and hasattr(source, "crs"):
+        return Features(np.asarray(geometry, dtype=object), _usable(source.crs), "The frame")
+    return Features(_as_geometries(source), None, "The geometry", bare=True)
+
+
+def _as_geometries(source: Any) -> npt.NDArray[np.object_]:
+    items = [source] if isinstance(source, shapely.Geometry) else source
+    try:
+        out = np.array(list(items), dtype=object).ravel()
+    except TypeError:
+        out = np.array([source], dtype=object)
+    if not all(g is None or isinstance(g, shapely.Geometry) for g in out):
+        raise BoundaryError(
+            f"A boundary cannot be read from {type(source).__name__}: give a path, a "
+            "GeoDataFrame, a GeoSeries or shapely polygons."
+        )
+    return out
+
+
+def _usable(crs: Any) -> pyproj.CRS | None:
+    """Return the horizontal CRS; None for none and for undefined, local ones."""
+    if crs is None:
+        return None
+    crs = horizontal(pyproj.CRS.from_user_input(crs))
+    known = crs.is_projected or crs.is_geographic
+    return crs if known and not crs.name.lower().startswith("undefined") else None
+
+
+def _must_exist(path: str) -> None:
+    virtual = "://" in path or path.startswith("/vsi")
+    if not virtual and not Path(path).exists():
+        raise BoundaryError(f"The file {path} does not exist.")
+
+
+def _read_parquet(path: str, layer: str | None, where: str | None) -> Features:
+    import geopandas
+
+    _must_exist(path)
+    if layer is not None or where is not None:
+        raise BoundaryError(
+            "layer and where do not apply to GeoParquet: write the features you mean to a "
+            "GeoPackage, or select them in a GeoDataFrame."
+        )
+    try:
+        frame = geopandas.read_parquet(path)
+    except ImportError as error:
+        raise DependencyError("GeoParquet needs the package pyarrow: install it.") from error
+    except (ValueError, OSError) as error:
+        raise BoundaryError(f"{path} cannot be read as GeoParquet: {_first_line(error)}") from error
+    return Features(np.asarray(frame.geometry, dtype=object), _usable(frame.crs), path)
+
+
+def _read_file(path: str, layer: str | None, where: str | None) -> Features:
+    _must_exist(path)
+    layer = _choose_layer(path, layer)
+    try:
+        meta, _, wkb, _ = pyogrio.raw.read(
+            path, layer=layer, where=where, columns=[], force_2d=True, read_geometry=True
+        )
+    except (DataSourceError, DataLayerError, FieldError, GeometryError, ValueError) as error:
+        if where is not None:
+            raise BoundaryError(
+                f"The filter where={where!r} does not work on layer {layer!r}: "
+                f"{_first_line(error)}. Its columns are {_columns(path, layer)}."
+            ) from error
+        raise BoundaryError(f"{path} cannot be read: {_first_line(error)}") from error
+    if wkb is None:
+        raise BoundaryError(f"Layer {layer!r} of {path} is a table without geometry.")
+    crs = _usable(meta["crs"])
+    return Features(np.asarray(shapely.from_wkb(wkb), dtype=object), crs, path)
+
+
+def _choose_layer(path: str, layer: str | None) -> str:
+    """Return the layer asked for, else the only one that can hold polygons."""
+    try:
+        layers = pyogrio.list_layers(path)
+    except DataSourceError as error:
+        raise BoundaryError(
+            f"{path} cannot be read: it is not a vector file that GDAL knows, or it is damaged."
+        ) from error
+    names = [str(name) for name in layers[:, 0]]
+    if layer is not None:
+        if layer not in names:
+            raise BoundaryError(
+                f"{path} has no layer {layer!r}; its layers are {_listed(names)}."
+            )
+        return layer
+    spatial = [str(name) for name, kind in layers if kind is not None]
+    polygons = [
+        str(name) for name, kind in layers if kind is not None and _may_hold_polygons(kind)
+    ]
+    candidates = polygons or spatial or names
+    if _PREFERRED_LAYER in candidates:
+        return _PREFERRED_LAYER
+    if len(candidates) != 1:
+        raise BoundaryError(
+            f"{path} has several layers: {_listed(candidates)}. Choose one with layer (--layer)."
+            if candidates
+            else f"{path} has no layers."
+        )
+    return candidates[0]
+
+
+def _may_hold_polygons(kind: str) -> bool:
+    return any(word in kind for word in ("Polygon", "Surface", "Unknown", "Collection", "TIN"))
+
+
+def _columns(path: str, layer: str) -> str:
+    return _listed([str(name) for name in pyogrio.read_info(path, layer=layer)["fields"]])
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names) if names else "(none)"
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0].rstrip(".") if str(error).strip() else "no reason given"

@@ -1,0 +1,168 @@
+"""`GeoLayout`: a layout as GeoDataFrames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+
+from urban_processing.layout import Layout
+from urban_processing.metrics import Certificate, LayoutMeasures, Table, certificate, layout_tables
+from urban_processing.schema import ColumnType, GeometryType, layer
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class GeoLayout:
+    """A layout of parcels and streets, its layers as GeoDataFrames in map coordinates.
+
+    Parameters
+    ----------
+    layout
+        The layout on its mesh, as the engine made it.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> import urban_processing as up
+    >>> land = shapely.box(0, 0, 300, 200)
+    >>> layout = up.cogenerate(land, crs="EPSG:32630", min_area=2000)  # doctest: +SKIP
+    >>> layout.parcels.area_m2.min() >= 2000  # doctest: +SKIP
+    True
+    """
+
+    layout: Layout
+
+    @property
+    def parcels(self) -> gpd.GeoDataFrame:
+        """Parcels, indexed by parcel_id."""
+        return self.frame("parcels").set_index("parcel_id")
+
+    @property
+    def streets(self) -> gpd.GeoDataFrame:
+        """Street centrelines between junctions, rim included, indexed by edge_id."""
+        return self.frame("streets").set_index("edge_id")
+
+    @property
+    def junctions(self) -> gpd.GeoDataFrame:
+        """Junctions and street ends, indexed by junction_id."""
+        return self.frame("junctions").set_index("junction_id")
+
+    @property
+    def boundary(self) -> gpd.GeoDataFrame:
+        """Land that was laid out, one row for each part."""
+        return self.frame("boundary")
+
+    @property
+    def input_boundary(self) -> gpd.GeoDataFrame:
+        """Boundary as given, before repair and simplification."""
+        return self.frame("input_boundary")
+
+    @property
+    def issues(self) -> gpd.GeoDataFrame:
+        """What could not be done, and what one should know."""
+        return self.frame("issues")
+
+    @property
+    def metrics(self) -> pd.DataFrame:
+        """Metrics of the whole (part empty) and of each part of the land."""
+        return self.frame("metrics")
+
+    @property
+    def provenance(self) -> pd.DataFrame:
+        """Steps that made the layout, with their parameters and seed."""
+        return self.frame("provenance")
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """Checks on the geometry that every promise of a layout holds."""
+        return certificate(self.layout)
+
+    @property
+    def crs(self) -> Any:
+        """CRS of the geometries, None for a plane without CRS."""
+        return self.boundary.crs
+
+    @cached_property
+    def tables(self) -> dict[str, Table]:
+        """All layers as plain arrays, as they are written to files."""
+        return layout_tables(self.layout, measures=LayoutMeasures(self.layout))
+
+    def frame(self, name: str) -> gpd.GeoDataFrame | pd.DataFrame:
+        """Return a layer of the schema as a frame of its own; empty if the layout has none."""
+        return table_frame(name, self.tables.get(name), crs=self.layout.frame.crs)
+
+    def metric(self, name: str, *, part: int | None = None) -> float:
+        """Return one metric of the whole, or of a part; `KeyError` if there is none."""
+        table = self.tables["metrics"]
+        of_part = np.isnan(table["part"]) if part is None else table["part"] == part
+        found = np.flatnonzero(of_part & (table["metric"] == name))
+        if not len(found):
+            raise KeyError(f"There is no metric {name!r}" + ("" if part is None else f" of part {part}"))
+        return float(table["value"][found[0]])
+
+    def plot(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        ax: Axes | None = None,
+        colour_by: str | None = None,
+        title: str = "",
+    ) -> Figure:
+        """Draw a map; see `urban_processing.report.map.plot_layout`."""
+        from urban_processing.report.map import plot_layout
+
+        return plot_layout(self, path, ax=ax, colour_by=colour_by, title=title)
+
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        overwrite: bool = False,
+        record_seconds: bool = False,
+    ) -> Path:
+        """Write a GeoPackage; see `urban_processing.io.files.write_layout`."""
+        from urban_processing.io.files import write_layout
+
+        return write_layout(
+            self.layout, path, overwrite=overwrite, record_seconds=record_seconds
+        )
+
+    def __repr__(self) -> str:
+        tables = self.tables
+        crs = self.layout.frame.crs or "no CRS"
+        crs = crs if len(crs) < 20 else str(self.crs.name)
+        return (
+            f"GeoLayout({len(tables['parcels'])} parcels, {self.metric('streets'):.0f} streets, "
+            f"{self.metric('junctions'):.0f} junctions, "
+            f"{self.metric('street_ends'):.0f} street ends, "
+            f"{len(tables['boundary'])} part(s), {self.metric('area_m2') / 1e4:.4g} ha, "
+            f"{len(tables['issues'])} issue(s), {crs})"
+        )
+
+
+def table_frame(name: str, table: Table | None, *, crs: str) -> gpd.GeoDataFrame | pd.DataFrame:
+    """Return a table of the schema as a frame: whole numbers that may be missing as Int64."""
+    declared = layer(name)
+    columns: dict[str, Any] = {}
+    for column in declared.columns:
+        values = np.empty(0, dtype=object) if table is None else table[column.name]
+        if column.dtype is ColumnType.INTEGER and column.nullable:
+            columns[column.name] = pd.array(values, dtype="Int64")
+        elif column.dtype is ColumnType.TEXT:
+            columns[column.name] = pd.Series(values, dtype="str")
+        else:
+            columns[column.name] = np.asarray(values, dtype=column.dtype.value)
+    if declared.geometry is GeometryType.NONE:
+        return pd.DataFrame(columns)
+    geometry = [] if table is None or table.geometry is None else table.geometry
+    return gpd.GeoDataFrame(columns, geometry=gpd.GeoSeries(geometry, crs=crs or None))

@@ -1,0 +1,239 @@
+"""QGIS styles of the layers of a layout file, as QML, on white and on a street map alike."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+QML_VERSION = "3.22.0"
+_METRES, _MILLIMETRES = "RenderMetersInMapUnits", "MM"
+
+_PAPER = "246,244,238,215"
+_OUTLINE = "140,134,124,255"
+_TRIANGLE = "182,160,214,230"
+_REDS = ("247,200,186,230", "238,140,116,230", "214,69,56,235")
+_STREET, _CASING = "255,204,70,255", "133,102,26,255"
+_DARK, _ALERT = "70,66,58,255", "200,30,40,255"
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """One entry of a legend: the features that pass `filter` (all others for ELSE)."""
+
+    label: str
+    filter: str
+    layers: Sequence[ET.Element]
+    symbol: str
+
+
+def layer_style(name: str, *, aliases: Mapping[str, str]) -> str | None:
+    """Return the QML of a layer, None for layers that have no style.
+
+    Parameters
+    ----------
+    name
+        Name of the layer, as in the schema.
+    aliases
+        Readable name of each column.
+    """
+    rules = _RULES.get(name)
+    if rules is None:
+        return None
+    root = ET.Element(
+        "qgis", version=QML_VERSION, styleCategories="Symbology|Fields|Rendering|MapTips"
+    )
+    root.append(_renderer(rules(), symbol_levels=name == "streets"))
+    _add_aliases(root, aliases)
+    ET.indent(root, " ")
+    return ET.tostring(root, encoding="unicode")
+
+
+def _renderer(rules: Sequence[_Rule], *, symbol_levels: bool) -> ET.Element:
+    """A rule-based renderer; with symbol levels all casings lie below all fills."""
+    renderer = ET.Element(
+        "renderer-v2",
+        type="RuleRenderer",
+        symbollevels=str(int(symbol_levels)),
+        forceraster="0",
+        enableorderby="0",
+    )
+    tree = ET.SubElement(renderer, "rules", key="{0}")
+    symbols = ET.SubElement(renderer, "symbols")
+    for number, rule in enumerate(rules):
+        attributes = {"key": f"{{{number + 1}}}", "symbol": str(number), "label": rule.label}
+        if rule.filter:
+            attributes["filter"] = rule.filter
+        ET.SubElement(tree, "rule", attributes)
+        symbol = ET.SubElement(
+            symbols,
+            "symbol",
+            name=str(number),
+            type=rule.symbol,
+            alpha="1",
+            clip_to_extent="1",
+            force_rhr="0",
+        )
+        symbol.extend(rule.layers)
+    return renderer
+
+
+def _layer(
+    kind: str, options: Mapping[str, str], *, level: int = 0, data_defined: Mapping[str, str] = {}
+) -> ET.Element:
+    """One symbol layer; `data_defined` gives expressions for properties."""
+    layer = ET.Element(
+        "layer", {"class": kind, "enabled": "1", "locked": "0", "pass": str(level)}
+    )
+    table = ET.SubElement(layer, "Option", type="Map")
+    for key, value in options.items():
+        ET.SubElement(table, "Option", name=key, value=value, type="QString")
+    for key, value in options.items():
+        ET.SubElement(layer, "prop", k=key, v=value)
+    if data_defined:
+        properties = ET.SubElement(layer, "data_defined_properties")
+        outer = ET.SubElement(properties, "Option", type="Map")
+        ET.SubElement(outer, "Option", name="name", value="", type="QString")
+        inner = ET.SubElement(outer, "Option", name="properties", type="Map")
+        for key, expression in data_defined.items():
+            entry = ET.SubElement(inner, "Option", name=key, type="Map")
+            ET.SubElement(entry, "Option", name="active", value="true", type="bool")
+            ET.SubElement(entry, "Option", name="expression", value=expression, type="QString")
+            ET.SubElement(entry, "Option", name="type", value="3", type="int")
+        ET.SubElement(outer, "Option", name="type", value="collection", type="QString")
+    return layer
+
+
+def _fill(
+    color: str, *, outline: str = _OUTLINE, width: float = 0.1, dash: str = "solid"
+) -> ET.Element:
+    return _layer(
+        "SimpleFill",
+        {
+            "color": color,
+            "style": "solid" if color else "no",
+            "outline_color": outline,
+            "outline_style": dash,
+            "outline_width": str(width),
+            "outline_width_unit": _MILLIMETRES,
+            "joinstyle": "round",
+        },
+    )
+
+
+def _line(color: str, *, factor: float, at_least: float, level: int) -> ET.Element:
+    """A line as wide as the street, and no thinner on the map than `at_least` mm."""
+    return _layer(
+        "SimpleLine",
+        {
+            "line_color": color,
+            "line_style": "solid",
+            "line_width": str(12 * factor),
+            "line_width_unit": _METRES,
+            "width_map_unit_scale": f"3x:0,0,1,{at_least},0,0",
+            "capstyle": "round",
+            "joinstyle": "round",
+        },
+        level=level,
+        data_defined={"outlineWidth": f'{factor} * "width_m"'},
+    )
+
+
+def _street(factor: float) -> list[ET.Element]:
+    casing = _line(_CASING, factor=1.4 * factor, at_least=0.62, level=0)
+    return [casing, _line(_STREET, factor=factor, at_least=0.36, level=1)]
+
+
+def _marker(
+    shape: str, color: str, *, metres: float, at_least: float, outline: str = _CASING
+) -> ET.Element:
+    return _layer(
+        "SimpleMarker",
+        {
+            "name": shape,
+            "color": color,
+            "outline_color": outline,
+            "outline_width": "0.15",
+            "outline_width_unit": _MILLIMETRES,
+            "size": str(metres),
+            "size_unit": _METRES,
+            "size_map_unit_scale": f"3x:0,0,1,{at_least},0,0",
+        },
+    )
+
+
+def _parcels() -> list[_Rule]:
+    irregular = "\"sides\" <> 3 AND \"irregularity\" > "
+    return [
+        _Rule("Triangle", '"sides" = 3', [_fill(_TRIANGLE)], "fill"),
+        _Rule("Irregularity above 0.4", irregular + "0.4", [_fill(_REDS[2])], "fill"),
+        _Rule(
+            "Irregularity 0.2 to 0.4",
+            irregular + '0.2 AND "irregularity" <= 0.4',
+            [_fill(_REDS[1])],
+            "fill",
+        ),
+        _Rule(
+            "Irregularity 0.1 to 0.2",
+            irregular + '0.1 AND "irregularity" <= 0.2',
+            [_fill(_REDS[0])],
+            "fill",
+        ),
+        _Rule("Parcel", "ELSE", [_fill(_PAPER)], "fill"),
+    ]
+
+
+def _streets() -> list[_Rule]:
+    labels = {
+        "rim": "Rim street",
+        "fixed": "Fixed street",
+        "collector": "Collector",
+        "local": "Local street",
+        "cul_de_sac": "Cul-de-sac",
+    }
+    return [
+        _Rule(label, f"\"class\" = '{name}'", _street(0.6), "line")
+        for name, label in labels.items()
+    ]
+
+
+def _junctions() -> list[_Rule]:
+    small = _marker("circle", "255,255,255,255", metres=4, at_least=0.35)
+    end = _marker("circle", _STREET, metres=14, at_least=0.9)
+    entry = _marker("triangle", "255,255,255,255", metres=14, at_least=1.4)
+    return [
+        _Rule("Junction", "\"kind\" = 'junction'", [small], "marker"),
+        _Rule("Street end", "\"kind\" = 'end'", [end], "marker"),
+        _Rule("Entry", "\"kind\" = 'entry'", [entry], "marker"),
+    ]
+
+
+def _issues() -> list[_Rule]:
+    alert = _marker("diamond", "255,255,255,255", metres=1, at_least=2.4, outline=_ALERT)
+    area = _fill("200,30,40,30", outline=_ALERT, width=0.4)
+    kind = "geometry_type($geometry) = "
+    return [
+        _Rule("Issue at a place", kind + "'Point'", [alert], "marker"),
+        _Rule("Issue of an area", kind + "'Polygon'", [area], "fill"),
+    ]
+
+
+_RULES = {
+    "parcels": _parcels,
+    "streets": _streets,
+    "junctions": _junctions,
+    "boundary": lambda: [_Rule("Land", "", [_fill("", outline=_DARK, width=0.3)], "fill")],
+    "input_boundary": lambda: [
+        _Rule("Boundary as given", "", [_fill("", outline=_DARK, width=0.2, dash="dash")], "fill")
+    ],
+    "obstacles": lambda: [_Rule("Obstacle", "", [_fill("199,218,201,230")], "fill")],
+    "right_of_way": lambda: [_Rule("Right-of-way", "", [_fill(_STREET)], "fill")],
+    "net_parcels": lambda: [_Rule("Net parcel", "", [_fill(_PAPER)], "fill")],
+    "issues": _issues,
+}
+
+
+def _add_aliases(root: ET.Element, aliases: Mapping[str, str]) -> None:
+    table = ET.SubElement(root, "aliases")
+    for index, (field, name) in enumerate(aliases.items()):
+        ET.SubElement(table, "alias", index=str(index + 1), field=field, name=name)

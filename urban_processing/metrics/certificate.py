@@ -1,0 +1,298 @@
+"""The certificate: what every layout promises, checked on its output geometry alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from urban_processing.layout import Layout
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.metrics.overlap import covered_share, find_overlaps, segments_of
+from urban_processing.metrics.parcels import reached_frontage
+from urban_processing.metrics.tables import (
+    Table,
+    boundary_table,
+    issue_table,
+    parcel_table,
+    street_table,
+)
+
+PARTITION_LIMIT = 1e-8
+"""Largest symmetric difference of parcels and land, as a share of the land's area."""
+
+SNAP_M = 1e-6
+"""Coordinates closer than this, in metres, are the same place."""
+
+AREA_ROUNDING = 1e-9
+"""Share of the smallest allowed area that may be lost to rounding."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One promise: `value` is held against `limit`; `offenders` are parcel numbers."""
+
+    name: str
+    holds: bool
+    value: float
+    limit: float
+    message: str
+    offenders: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """All checks of a layout."""
+
+    checks: tuple[Check, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every check holds."""
+        return all(check.holds for check in self.checks)
+
+    @property
+    def failures(self) -> tuple[Check, ...]:
+        """The checks that do not hold."""
+        return tuple(check for check in self.checks if not check.holds)
+
+    def check(self, name: str) -> Check:
+        """Return the check called `name`; `KeyError` if there is none."""
+        for check in self.checks:
+            if check.name == name:
+                return check
+        raise KeyError(f"The certificate has no check {name}.")
+
+
+def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None) -> Certificate:
+    """Certify a layout by its tables.
+
+    Parameters
+    ----------
+    layout
+        The layout.
+    land
+        Polygon of each part in local coordinates, such as ``site.parts`` after
+        simplification; by default the rims of the layout itself.
+    """
+    boundary = boundary_table(layout)
+    if land is not None:
+        origin = np.asarray(layout.frame.origin)
+        moved = shapely.transform(np.array(land, dtype=object), lambda xy: xy + origin)
+        boundary = Table({"part": np.arange(len(land)), "area_m2": shapely.area(moved)}, moved)
+    return certify(
+        parcel_table(layout),
+        street_table(layout),
+        boundary,
+        min_area=layout.min_area,
+        issues=issue_table(layout),
+    )
+
+
+def certify(
+    parcels: Table,
+    streets: Table,
+    boundary: Table,
+    *,
+    min_area: float,
+    issues: Table | None = None,
+) -> Certificate:
+    """Certify a layout by its layers, as they are in a file.
+
+    Nothing but the geometries, `parcel_id` and `part` is relied on: areas, frontages and
+    connections are worked out anew.
+
+    Parameters
+    ----------
+    parcels, streets, boundary
+        Layers of the schema with geometry, all in one projected, metric CRS.
+    min_area
+        The smallest parcel allowed, m².
+    issues
+        The `issues` layer. Where it is given, a parcel smaller than `min_area`, allowed if
+        it is a whole part, must be listed there.
+
+    Returns
+    -------
+    Certificate
+        Checks `valid_polygons`, `coverage`, `land_covered`, `reached`, `streets_on_boundaries`,
+        `streets_connected` and `min_area`.
+    """
+    ids = np.asarray(parcels["parcel_id"], dtype=np.int64)
+    part = np.asarray(parcels["part"], dtype=np.int64)
+    polygons, lines, land = _shift_to_origin(_geometry(parcels), streets, boundary)
+    usable = _usable(polygons)
+    land_part = np.asarray(boundary["part"], dtype=np.int64)
+    return Certificate(
+        (
+            _valid(ids, usable),
+            _coverage(ids[usable], polygons[usable]),
+            _land_covered(polygons[usable], part[usable], land, land_part),
+            *_street_checks(ids, polygons, lines, usable),
+            _connected(lines, np.asarray(streets["part"], dtype=np.int64), land_part, ids, part),
+            _large_enough(ids, part, polygons, min_area, issues),
+        )
+    )
+
+
+def _geometry(table: Table) -> npt.NDArray[np.object_]:
+    if table.geometry is None:
+        raise ValueError("A layer without geometry cannot be certified.")
+    return table.geometry
+
+
+def _shift_to_origin(
+    polygons: npt.NDArray[np.object_], streets: Table, boundary: Table
+) -> tuple[npt.NDArray[np.object_], npt.NDArray[np.object_], npt.NDArray[np.object_]]:
+    """Move everything near the origin by whole metres: far-off coordinates lose digits."""
+    land = _geometry(boundary)
+    low = np.floor(np.nan_to_num(shapely.total_bounds(land))[:2])
+    moved = [
+        np.asarray(shapely.transform(g, lambda xy: xy - low))
+        for g in (polygons, _geometry(streets), land)
+    ]
+    return moved[0], moved[1], moved[2]
+
+
+def _usable(polygons: npt.NDArray[np.object_]) -> BoolArray:
+    is_polygon = shapely.get_type_id(polygons) == shapely.GeometryType.POLYGON
+    return np.asarray(is_polygon & shapely.is_valid(polygons) & ~shapely.is_empty(polygons))
+
+
+def _valid(ids: IntArray, usable: BoolArray) -> Check:
+    bad = ids[~usable]
+    return _check("valid_polygons", len(bad), 0, "parcels that are no valid polygon", bad)
+
+
+def _coverage(ids: IntArray, polygons: npt.NDArray[np.object_]) -> Check:
+    """Neighbours share their boundaries vertex by vertex; overlaps break this."""
+    edges = shapely.coverage_invalid_edges(polygons)
+    bad = ids[~shapely.is_empty(edges)]
+    return _check(
+        "coverage", len(bad), 0, "parcels that overlap others or do not match their boundaries", bad
+    )
+
+
+def _land_covered(
+    polygons: npt.NDArray[np.object_],
+    part: IntArray,
+    land: npt.NDArray[np.object_],
+    land_part: IntArray,
+) -> Check:
+    """Gaps and overhangs, and overlaps, which the union alone would hide."""
+    difference = 0.0
+    for p in np.union1d(part, land_part).tolist():
+        own = polygons[part == p]
+        union = shapely.union_all(own)
+        whole = shapely.union_all(land[land_part == p])
+        difference += shapely.area(shapely.symmetric_difference(union, whole))
+        difference += abs(float(shapely.area(own).sum()) - shapely.area(union))
+    share = difference / max(float(shapely.area(land).sum()), np.finfo(float).tiny)
+    return _check(
+        "land_covered",
+        share,
+        PARTITION_LIMIT,
+        "of the land's area in gaps, overlaps and overhangs of the parcels",
+        np.empty(0, dtype=np.int64),
+    )
+
+
+def _street_checks(
+    ids: IntArray,
+    polygons: npt.NDArray[np.object_],
+    lines: npt.NDArray[np.object_],
+    usable: BoolArray,
+) -> tuple[Check, Check]:
+    """Frontage of each parcel, and street length that lies on no parcel's boundary."""
+    outlines = polygons.copy()
+    outlines[~usable] = None
+    street, outline = segments_of(lines), segments_of(outlines)
+    overlaps = find_overlaps(street, outline, SNAP_M)
+    length = (overlaps.high - overlaps.low) * street.length[overlaps.first]
+    owner = outline.line[overlaps.second]
+    frontage = np.bincount(owner, weights=length, minlength=len(ids))
+    area = np.where(usable, shapely.area(polygons), 0.0)
+    # overlaps are measured to the micrometre, as coordinates are kept
+    bad = ids[~usable | (frontage < reached_frontage(area) - SNAP_M)]
+    off = float(((1.0 - covered_share(overlaps, len(street.line))) * street.length).sum())
+    rounding = SNAP_M * (1 + len(street.line))
+    return (
+        _check("reached", len(bad), 0, "parcels that no street reaches", bad),
+        _check(
+            "streets_on_boundaries",
+            off,
+            rounding,
+            "metres of street that run along no parcel's boundary",
+            np.empty(0, dtype=np.int64),
+        ),
+    )
+
+
+def _connected(
+    lines: npt.NDArray[np.object_],
+    street_part: IntArray,
+    land_part: IntArray,
+    ids: IntArray,
+    part: IntArray,
+) -> Check:
+    """Exactly one component of streets in each part; lines connect at shared vertices."""
+    segments = segments_of(lines)
+    ends = np.round(np.concatenate([segments.start, segments.end]) / SNAP_M)
+    _, node = np.unique(ends, axis=0, return_inverse=True)
+    node = node.reshape(2, -1)
+    n = int(node.max(initial=-1)) + 1
+    graph = coo_array((np.ones(node.shape[1], dtype=np.int8), (node[0], node[1])), shape=(n, n))
+    label = connected_components(graph, directed=False)[1] if n else np.empty(0, dtype=np.int64)
+    wrong = []
+    most = 1
+    for p in np.unique(land_part).tolist():
+        found = len(np.unique(label[node[0][street_part[segments.line] == p]]))
+        if found != 1:
+            wrong.append(p)
+            most = max(most, found) if found else 0
+    return Check(
+        "streets_connected",
+        not wrong,
+        float(most),
+        1.0,
+        "Each part has one connected street network."
+        if not wrong
+        else f"Parts {wrong} have no street network, or one in several pieces (at most {most}).",
+        tuple(ids[np.isin(part, wrong)].tolist()),
+    )
+
+
+def _large_enough(
+    ids: IntArray,
+    part: IntArray,
+    polygons: npt.NDArray[np.object_],
+    min_area: float,
+    issues: Table | None,
+) -> Check:
+    """No parcel under `min_area`, unless it is a whole part and listed as an issue."""
+    area: FloatArray = np.nan_to_num(shapely.area(polygons))
+    small = area < min_area * (1.0 - AREA_ROUNDING)
+    _, inverse, count = np.unique(part, return_inverse=True, return_counts=True)
+    excused = count[inverse] == 1
+    if issues is not None:
+        excused &= np.isin(ids, issues["parcel_id"])
+    bad = small & ~excused
+    return Check(
+        "min_area",
+        not bad.any(),
+        float(area.min(initial=np.inf, where=~(small & excused))),
+        min_area,
+        f"{int(bad.sum())} parcels are smaller than {min_area:g} m².",
+        tuple(ids[bad].tolist()),
+    )
+
+
+def _check(name: str, value: float, limit: float, what: str, bad: IntArray) -> Check:
+    return Check(
+        name, value <= limit, float(value), float(limit), f"{value:g} {what}.", tuple(bad.tolist())
+    )

@@ -1,0 +1,243 @@
+"""Metrics of a whole layout: Chen 2024, Table 1, and those that planners ask for besides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
+from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
+from urban_processing.metrics.registry import INTERIOR, METRICS
+from urban_processing.streets.network import NodeKind, StreetNetwork, street_network
+
+IRREGULAR = 0.1
+"""Parcels with a larger irregularity are called irregular (Chen 2024, Fig. 17)."""
+
+SMALL_BLOCK = 3
+"""Blocks of at most this many parcels count as small."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of a layout; `part` is None for the whole, `value` NaN where undefined."""
+
+    part: int | None
+    metric: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutMeasures:
+    """What tables and metrics of one layout have in common, each worked out when asked for."""
+
+    layout: Layout
+
+    @cached_property
+    def parcels(self) -> ParcelMeasures:
+        """Measures of the parcels."""
+        return measure_parcels(self.layout)
+
+    @cached_property
+    def network(self) -> StreetNetwork:
+        """The street network."""
+        return street_network(self.layout)
+
+    @cached_property
+    def parts(self) -> IntArray:
+        """Parts of the land that have parcels."""
+        return np.unique(self.layout.face_part)
+
+    @cached_property
+    def parcel_block(self) -> IntArray:
+        """(F,) block of a parcel: parcels joined across edges that are not street."""
+        mesh = self.layout.mesh
+        sides = mesh.face.reshape(-1, 2)
+        joined = ~self.layout.edge_street & (sides != OUTSIDE).all(axis=1)
+        a, b = sides[joined].T
+        n = mesh.n_faces
+        ones = np.ones(len(a), dtype=np.int8)
+        return np.asarray(
+            connected_components(coo_array((ones, (a, b)), shape=(n, n)), directed=False)[1],
+            dtype=np.int64,
+        )
+
+
+def measure(layout: Layout, *, measures: LayoutMeasures | None = None) -> tuple[Metric, ...]:
+    """Measure a layout: every metric of the registry, in its order.
+
+    Parameters
+    ----------
+    layout
+        The layout.
+    measures
+        Measures of the same layout, where they are at hand.
+
+    Returns
+    -------
+    tuple of Metric
+        For the whole (part None) and, if the land has several parts, for each of them.
+
+    Examples
+    --------
+    >>> import numpy as np, shapely
+    >>> from urban_processing.layout import layout_from_mesh
+    >>> from urban_processing.mesh.build import mesh_from_polygons
+    >>> from urban_processing.site import Frame
+    >>> mesh = mesh_from_polygons([shapely.box(0, 0, 20, 20)])
+    >>> layout = layout_from_mesh(mesh, frame=Frame(), face_part=np.zeros(1), min_area=400)
+    >>> {m.metric: m.value for m in measure(layout)}["perimeter_m"]
+    80.0
+    """
+    known = LayoutMeasures(layout) if measures is None else measures
+    parts = known.parts.tolist()
+    scopes: list[int | None] = [None, *(parts if len(parts) > 1 else [])]
+    out: list[Metric] = []
+    for part in scopes:
+        values = _values(known, part)
+        for spec in METRICS:
+            if part is not None and not spec.by_part:
+                continue
+            out.append(Metric(part, spec.name, float(values[spec.name]), spec.unit))
+            if spec.of_parcels:
+                name = spec.name + INTERIOR
+                out.append(Metric(part, name, float(values[name]), spec.unit))
+    return tuple(out)
+
+
+def _values(known: LayoutMeasures, part: int | None) -> dict[str, float]:
+    """Every metric of the whole or of one part by name."""
+    layout = known.layout
+    inside = np.ones(layout.mesh.n_faces, dtype=bool)
+    if part is not None:
+        inside = layout.face_part == part
+    interior = inside & ~known.parcels.rim
+    of_parcels = _parcel_values(known, inside)
+    return {
+        **of_parcels,
+        **{k + INTERIOR: v for k, v in _parcel_values(known, interior).items()},
+        **_land_values(layout, inside),
+        **_street_values(known, part, inside),
+        **_block_values(known, inside),
+        "seconds": math.fsum(step.seconds for step in layout.history),
+    }
+
+
+def _parcel_values(known: LayoutMeasures, chosen: BoolArray) -> dict[str, float]:
+    p, smallest = known.parcels, known.layout.min_area
+    n = int(chosen.sum())
+    area, irregularity, sides = p.area[chosen], p.irregularity[chosen], p.sides[chosen]
+    frontage, thinness = p.frontage[chosen], p.thinness[chosen]
+    corner_chosen = np.repeat(chosen, p.sides)
+    mean_area = _mean(area)
+    return {
+        "parcels": n,
+        "triangles": int((sides == 3).sum()),
+        "quads": int((sides == 4).sum()),
+        "pentagons": int((sides == 5).sum()),
+        "hexagons": int((sides == 6).sum()),
+        "more_sides": int((sides > 6).sum()),
+        "quads_pct": _percent(sides == 4),
+        "irregularity_min": _lowest(irregularity),
+        "irregularity_mean": _mean(irregularity),
+        "irregularity_max": _highest(irregularity),
+        "irregular_pct": _percent(irregularity > IRREGULAR),
+        "unreached": int((~p.reached[chosen]).sum()),
+        "frontage_mean_m": _mean(frontage),
+        "frontage_min_m": _lowest(frontage),
+        "thinness_mean": _mean(thinness),
+        "thinness_min": _lowest(thinness),
+        "p_angle_deg": _mean(np.abs(p.corner_angle[corner_chosen] - 90.0)),
+        "p_area": _mean(p.area_ratio[chosen]),
+        "undesirable_pct": _percent(p.undesirable[chosen]),
+        "through_lots": int(p.through[chosen].sum()),
+        "through_lots_pct": _percent(p.through[chosen]),
+        "area_mean_m2": mean_area,
+        "area_cv": float(area.std() / mean_area) if n else math.nan,
+        "area_min_over_mean": _lowest(area) / mean_area,
+        "area_max_over_min_area": _highest(area) / smallest,
+        "above_2_min_area_pct": _percent(area > 2.0 * smallest),
+        "above_3_min_area": int((area > 3.0 * smallest).sum()),
+    }
+
+
+def _land_values(layout: Layout, inside: BoolArray) -> dict[str, float]:
+    mesh = layout.mesh
+    boundary = mesh.edge_is_boundary & _edges_of(layout, inside)
+    return {
+        "perimeter_m": float(mesh.edge_length[boundary].sum()),
+        "area_m2": float(mesh.face_area[inside].sum()),
+        "min_area_m2": layout.min_area,
+        "deepest_level": int(layout.face_level[inside].max()),
+    }
+
+
+def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -> dict[str, float]:
+    """Figures of the streets without the rim (Chen 2024, Table 1)."""
+    layout, net = known.layout, known.network
+    mesh = layout.mesh
+    street = ~net.street_rim & _in_part(net.street_part, part)
+    node = net.node_interior & _in_part(net.node_part, part)
+    deviation = net.pair_deviation[node[net.pair_node]]
+    n_streets, n_parcels = int(street.sum()), int(inside.sum())
+    length = float(net.street_length[street].sum())
+    interior = (layout.edge_kind == EdgeKind.INTERIOR) & _edges_of(layout, inside)
+    interior_length = float(mesh.edge_length[interior].sum())
+    interior_street = float(mesh.edge_length[interior & layout.edge_street].sum())
+    side = math.sqrt(float(mesh.face_area[inside].mean()))
+    return {
+        "streets": n_streets,
+        "junctions": int((node & (net.node_kind == NodeKind.JUNCTION)).sum()),
+        "street_ends": int((node & (net.node_kind == NodeKind.END)).sum()),
+        "street_length_m": length,
+        "street_length_mean_m": length / n_streets if n_streets else math.nan,
+        "junction_deviation_deg": _mean(deviation),
+        "junction_deviation_max_deg": _highest(deviation),
+        "street_share_pct": (
+            100.0 * interior_street / interior_length if interior_length else math.nan
+        ),
+        "parcels_per_street": n_parcels / n_streets if n_streets else math.nan,
+        "street_length_relative": length / n_parcels / side,
+    }
+
+
+def _block_values(known: LayoutMeasures, inside: BoolArray) -> dict[str, float]:
+    _, size = np.unique(known.parcel_block[inside], return_counts=True)
+    return {
+        "blocks": len(size),
+        "block_parcels_median": float(np.median(size)),
+        "block_parcels_max": int(size.max()),
+        "small_blocks_pct": _percent(size <= SMALL_BLOCK),
+    }
+
+
+def _edges_of(layout: Layout, inside: BoolArray) -> BoolArray:
+    """(E,) edges that bound one of the chosen parcels."""
+    return np.asarray(inside[layout.mesh.face.reshape(-1, 2).max(axis=1)])
+
+
+def _in_part(of: IntArray, part: int | None) -> BoolArray:
+    return np.ones(len(of), dtype=bool) if part is None else np.asarray(of == part)
+
+
+def _mean(values: FloatArray) -> float:
+    return float(values.mean()) if len(values) else math.nan
+
+
+def _lowest(values: FloatArray) -> float:
+    return float(values.min()) if len(values) else math.nan
+
+
+def _highest(values: FloatArray) -> float:
+    return float(values.max()) if len(values) else math.nan
+
+
+def _percent(true: npt.NDArray[np.bool_]) -> float:
+    return 100.0 * float(true.mean()) if len(true) else math.nan

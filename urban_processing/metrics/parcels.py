@@ -1,0 +1,222 @@
+"""Measures of single parcels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from urban_processing.layout import Layout
+from urban_processing.mesh.corners import (
+    interior_angles,
+    polygon_irregularity,
+    reported_polygons,
+    ring_neighbours,
+)
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh
+
+REACHED_M = 3.0
+REACHED_SHARE = 0.25
+"""A parcel is reached from this frontage on: `REACHED_M`, or this share of √area if less."""
+
+OPPOSITE_DEG = 135.0
+"""Sides are opposite where their outward normals make a larger angle."""
+
+UNDESIRABLE_ANGLE_DEG = 15.0
+UNDESIRABLE_AREA_RATIO = 1.2
+"""Parcels above one of these are undesirable (Yang 2013, section 7)."""
+
+CIRCLE_TOLERANCE = 0.004
+OUTLINE_TOLERANCE = 0.003
+"""Accuracy of the inscribed circle and of the outline it is fitted to, relative to √area."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParcelMeasures:
+    """Measures of the F parcels of a layout; angles in degrees, lengths in metres.
+
+    Parameters
+    ----------
+    area
+        (F,) area to the centreline of streets, m².
+    corners, corner_offsets, corner_xy
+        Ragged corners of the reported approximate polygons as vertices of the mesh, and
+        their coordinates.
+    corner_angle
+        (C,) interior angle at each corner.
+    sides
+        (F,) number of sides of the reported polygon.
+    irregularity
+        (F,) Chen 2024, Eq. 1.
+    frontage
+        (F,) length of the boundary on street edges.
+    width, depth
+        (F,) extent of the parcel along and across its *street side*: of the sides of the
+        reported polygon the one with the longest frontage. NaN without frontage.
+    thinness
+        (F,) diameter of the largest inscribed circle over √area, within about 1 %.
+    angle_deviation
+        (F,) mean of abs(interior angle - 90°) over the corners (Yang 2013, p_angle).
+    area_ratio
+        (F,) area of the minimum rotated rectangle over the parcel's (Yang 2013, p_area).
+    rim
+        (F,) parcels with an edge on the land's rim or on a hole.
+    reached
+        (F,) parcels whose frontage is at least `reached_frontage`.
+    through
+        (F,) through lots: two opposite sides have at least `reached_frontage` each.
+    """
+
+    area: FloatArray
+    corners: IntArray
+    corner_offsets: IntArray
+    corner_xy: FloatArray
+    corner_angle: FloatArray
+    sides: IntArray
+    irregularity: FloatArray
+    frontage: FloatArray
+    width: FloatArray
+    depth: FloatArray
+    thinness: FloatArray
+    angle_deviation: FloatArray
+    area_ratio: FloatArray
+    rim: BoolArray
+    reached: BoolArray
+    through: BoolArray
+
+    @property
+    def undesirable(self) -> BoolArray:
+        """(F,) parcels that Yang 2013 calls undesirable."""
+        return np.asarray(
+            (self.angle_deviation > UNDESIRABLE_ANGLE_DEG)
+            | (self.area_ratio > UNDESIRABLE_AREA_RATIO)
+        )
+
+
+def reached_frontage(area: npt.ArrayLike) -> FloatArray:
+    """Frontage in metres from which parcels of `area` m² are reached: min(3 m, 0.25·√area)."""
+    side = np.sqrt(np.asarray(area, dtype=np.float64))
+    return np.asarray(np.minimum(REACHED_M, REACHED_SHARE * side))
+
+
+def measure_parcels(layout: Layout) -> ParcelMeasures:
+    """Measure every parcel of a layout; nothing is looped over in Python."""
+    mesh = layout.mesh
+    half_edges, offsets = outer_rings(mesh)
+    xy = mesh.xy[mesh.origin[half_edges]]
+    corners, corner_offsets = reported_polygons(xy, offsets)
+    corner_xy = xy[corners]
+    angle = np.degrees(interior_angles(corner_xy, corner_offsets))
+    deviation = np.add.reduceat(np.abs(angle - 90.0), corner_offsets[:-1])
+    sides = np.diff(corner_offsets)
+    on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
+    side_frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
+    width, depth = _width_and_depth(xy, offsets, corner_xy, corner_offsets, side_frontage)
+    area, polygons = mesh.face_area, mesh.face_polygons()
+    enough = reached_frontage(area)
+    return ParcelMeasures(
+        area=area,
+        corners=mesh.origin[half_edges[corners]],
+        corner_offsets=corner_offsets,
+        corner_xy=corner_xy,
+        corner_angle=angle,
+        sides=sides,
+        irregularity=polygon_irregularity(corner_xy, corner_offsets),
+        frontage=layout.frontage,
+        width=width,
+        depth=depth,
+        thinness=inscribed_thinness(polygons, area),
+        angle_deviation=deviation / sides,
+        area_ratio=shapely.area(shapely.minimum_rotated_rectangle(polygons)) / area,
+        rim=layout.rim_parcel,
+        reached=layout.frontage >= enough,
+        through=_through_lots(corner_xy, corner_offsets, side_frontage, enough),
+    )
+
+
+def outer_rings(mesh: PlanarMesh) -> tuple[IntArray, IntArray]:
+    """Half-edges of the outer loop of each face, as ragged rings."""
+    loops = mesh.loops
+    size = np.diff(loops.offsets)[mesh.face_loop]
+    offsets = np.append(0, np.cumsum(size))
+    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], size)
+    return loops.half_edges[np.repeat(loops.offsets[mesh.face_loop], size) + within], offsets
+
+
+def inscribed_thinness(polygons: npt.NDArray[np.object_], area: FloatArray) -> FloatArray:
+    """Diameter of the largest inscribed circle over √area, within about 1 %.
+
+    The outline is simplified first, by less than the accuracy asked for: the circle costs a
+    tenth of the time where a curved side has few vertices.
+    """
+    side = np.sqrt(area)
+    outline = shapely.simplify(polygons, OUTLINE_TOLERANCE * side)
+    radius = shapely.maximum_inscribed_circle(outline, CIRCLE_TOLERANCE * side)
+    return np.asarray(2.0 * shapely.length(radius) / side)
+
+
+def _frontage_of_sides(
+    on_street: FloatArray, offsets: IntArray, corners: IntArray, corner_offsets: IntArray
+) -> FloatArray:
+    """(C,) street length along the side that each corner of a reported polygon begins."""
+    at = np.searchsorted(corners, np.arange(len(on_street)), side="right") - 1
+    size = np.diff(offsets)
+    before_first = at < np.repeat(corner_offsets[:-1], size)
+    at = np.where(before_first, np.repeat(corner_offsets[1:] - 1, size), at)
+    length = np.bincount(at, weights=on_street, minlength=len(corners))
+    return np.asarray(length, dtype=np.float64)
+
+
+def _width_and_depth(
+    xy: FloatArray,
+    offsets: IntArray,
+    corner_xy: FloatArray,
+    corner_offsets: IntArray,
+    side_frontage: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Extents along and across the side with the longest frontage."""
+    _, after = ring_neighbours(corner_offsets)
+    longest = np.maximum.reduceat(side_frontage, corner_offsets[:-1])
+    hit = np.flatnonzero(side_frontage == np.repeat(longest, np.diff(corner_offsets)))
+    _, first = np.unique(np.searchsorted(corner_offsets, hit, side="right"), return_index=True)
+    side = hit[first]
+    direction = corner_xy[after[side]] - corner_xy[side]
+    direction = direction / np.hypot(direction[:, 0], direction[:, 1])[:, None]
+    d = np.repeat(direction, np.diff(offsets), axis=0)
+    local = xy - np.repeat(xy[offsets[:-1]], np.diff(offsets), axis=0)
+    along = local[:, 0] * d[:, 0] + local[:, 1] * d[:, 1]
+    across = local[:, 1] * d[:, 0] - local[:, 0] * d[:, 1]
+    has = longest > 0.0
+    return (
+        np.where(has, _extent(along, offsets), np.nan),
+        np.where(has, _extent(across, offsets), np.nan),
+    )
+
+
+def _extent(values: FloatArray, offsets: IntArray) -> FloatArray:
+    starts = offsets[:-1]
+    return np.maximum.reduceat(values, starts) - np.minimum.reduceat(values, starts)
+
+
+def _through_lots(
+    corner_xy: FloatArray, corner_offsets: IntArray, side_frontage: FloatArray, enough: FloatArray
+) -> BoolArray:
+    """(F,) whether two sides that face opposite ways and do not touch have frontage."""
+    _, after = ring_neighbours(corner_offsets)
+    size = np.diff(corner_offsets)
+    parcel = np.repeat(np.arange(len(size)), size)
+    d = corner_xy[after] - corner_xy
+    z = d[:, 0] + 1j * d[:, 1]
+    fronting = np.flatnonzero(side_frontage >= enough[parcel])
+    owner = parcel[fronting]
+    beyond = np.searchsorted(owner, owner, side="right") - np.arange(len(owner)) - 1
+    i = np.repeat(np.arange(len(owner)), beyond)
+    j = i + 1 + np.arange(len(i)) - np.repeat(np.cumsum(beyond) - beyond, beyond)
+    a, b = fronting[i], fronting[j]
+    turned = np.abs(np.degrees(np.angle(z[b] * np.conj(z[a]))))
+    touching = (after[a] == b) | (after[b] == a)
+    out = np.zeros(len(size), dtype=bool)
+    out[parcel[a[(turned > OPPOSITE_DEG) & ~touching]]] = True
+    return out

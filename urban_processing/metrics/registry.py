@@ -1,0 +1,123 @@
+"""The one declaration of every metric of a layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+INTERIOR = "_interior"
+"""Suffix of a metric that is taken over interior parcels alone."""
+
+
+@dataclass(frozen=True)
+class MetricSpec:
+    """What a metric is.
+
+    Parameters
+    ----------
+    name
+        Name in tables; `INTERIOR` is added where it is taken over interior parcels alone.
+    unit
+        ``m``, ``m²``, ``°``, ``%``, ``s`` or nothing for numbers and ratios.
+    source
+        Paper and place where the metric comes from, or nothing.
+    definition
+        What is measured, in one sentence.
+    of_parcels
+        Whether it is taken over a set of parcels, and so for interior parcels alone too.
+    by_part
+        Whether it is given for each part of a land of several parts.
+    """
+
+    name: str
+    unit: str
+    source: str
+    definition: str
+    of_parcels: bool = False
+    by_part: bool = True
+
+
+_CHEN, _YANG = "Chen 2024, Table 1", "Yang 2013, section 7"
+
+
+def _parcels(name: str, unit: str, source: str, definition: str) -> MetricSpec:
+    return MetricSpec(name, unit, source, definition, of_parcels=True)
+
+
+METRICS: tuple[MetricSpec, ...] = (
+    MetricSpec("perimeter_m", "m", _CHEN, "Length of the land's boundary, holes included."),
+    MetricSpec("area_m2", "m²", _CHEN, "Area of the land."),
+    MetricSpec("min_area_m2", "m²", _CHEN, "Smallest parcel allowed."),
+    _parcels("parcels", "", _CHEN, "Number of parcels."),
+    _parcels("triangles", "", _CHEN, "Parcels whose approximate polygon has three sides."),
+    _parcels("quads", "", _CHEN, "Parcels whose approximate polygon has four sides."),
+    _parcels("pentagons", "", _CHEN, "Parcels whose approximate polygon has five sides."),
+    _parcels("hexagons", "", _CHEN, "Parcels whose approximate polygon has six sides."),
+    _parcels("more_sides", "", _CHEN, "Parcels whose approximate polygon has seven or more sides."),
+    _parcels("quads_pct", "%", "", "Share of parcels with four sides."),
+    _parcels("irregularity_min", "", _CHEN, "Smallest irregularity (Eq. 1) of a parcel."),
+    _parcels("irregularity_mean", "", _CHEN, "Mean irregularity (Eq. 1) of the parcels."),
+    _parcels("irregularity_max", "", _CHEN, "Largest irregularity (Eq. 1) of a parcel."),
+    _parcels("irregular_pct", "%", "", "Share of parcels with an irregularity above 0.1."),
+    MetricSpec("streets", "", _CHEN, "Number of streets, those of the rim left out."),
+    MetricSpec(
+        "junctions", "", _CHEN, "Nodes where streets meet, at least one of them not of the rim."
+    ),
+    MetricSpec("street_ends", "", _CHEN, "Nodes with a single street edge that is not rim."),
+    MetricSpec("street_length_m", "m", _CHEN, "Total length of streets without the rim."),
+    MetricSpec("street_length_mean_m", "m", _CHEN, "Mean length of a street without the rim."),
+    MetricSpec(
+        "junction_deviation_deg",
+        "°",
+        _CHEN,
+        "Mean over all pairs of streets at junctions of 90° less the acute angle between them.",
+    ),
+    MetricSpec(
+        "junction_deviation_max_deg", "°", "", "Largest deviation from 90° of a pair of streets."
+    ),
+    MetricSpec("deepest_level", "", _CHEN, "Largest number of cuts that made a parcel."),
+    MetricSpec("seconds", "s", _CHEN, "Time that all steps of the layout took.", by_part=False),
+    _parcels("unreached", "", "", "Parcels with less frontage than min(3 m, 0.25 √area)."),
+    _parcels("frontage_mean_m", "m", "", "Mean length of a parcel's boundary on streets."),
+    _parcels("frontage_min_m", "m", "", "Smallest length of a parcel's boundary on streets."),
+    _parcels("thinness_mean", "", "", "Mean diameter of the largest inscribed circle over √area."),
+    _parcels("thinness_min", "", "", "Smallest such ratio of a parcel: slivers show here."),
+    _parcels(
+        "p_angle_deg", "°", _YANG, "Mean over all corners of all parcels of abs(angle - 90°)."
+    ),
+    _parcels(
+        "p_area", "", _YANG, "Mean of the minimum rotated rectangle's area over the parcel's."
+    ),
+    _parcels(
+        "undesirable_pct",
+        "%",
+        _YANG,
+        "Share of parcels with p_angle above 15° or p_area above 1.2.",
+    ),
+    _parcels("through_lots", "", "", "Parcels with frontage on two opposite sides."),
+    _parcels("through_lots_pct", "%", "", "Share of parcels with frontage on two opposite sides."),
+    _parcels("area_mean_m2", "m²", "", "Mean area of the parcels."),
+    _parcels("area_cv", "", "", "Standard deviation of the parcels' areas over their mean."),
+    _parcels("area_min_over_mean", "", "", "Smallest area of a parcel over the mean."),
+    _parcels(
+        "area_max_over_min_area", "", "", "Largest area of a parcel over the smallest allowed."
+    ),
+    _parcels(
+        "above_2_min_area_pct", "%", "", "Share of parcels above twice the smallest area allowed."
+    ),
+    _parcels("above_3_min_area", "", "", "Parcels above three times the smallest area allowed."),
+    MetricSpec(
+        "street_share_pct", "%", "", "Length of interior street edges over all interior edges."
+    ),
+    MetricSpec("parcels_per_street", "", _CHEN, "Parcels over streets without the rim."),
+    MetricSpec(
+        "street_length_relative",
+        "",
+        "",
+        "L*: street length without the rim for each parcel, over the root of the mean area.",
+    ),
+    MetricSpec("blocks", "", "", "Faces of the street network, rim included."),
+    MetricSpec("block_parcels_median", "", "", "Median number of parcels of a block."),
+    MetricSpec("block_parcels_max", "", "", "Largest number of parcels of a block."),
+    MetricSpec("small_blocks_pct", "%", "", "Share of blocks of three parcels or fewer."),
+)
+"""All metrics, in the order in which tables list them."""

@@ -1,0 +1,277 @@
+"""Parameters of the hierarchical co-generation of parcels and streets."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Annotated
+
+from urban_processing.params.base import Param, Params
+
+
+class StreetPattern(enum.StrEnum):
+    """Pattern of the street network (Chen 2024, Fig. 14)."""
+
+    LOOP = "loop"
+    CUL_DE_SAC = "cul-de-sac"
+    TREE = "tree"
+
+
+class Preset(enum.StrEnum):
+    """Which weights and rules to start from."""
+
+    RECOMMENDED = "recommended"
+    CHEN2024 = "chen2024"
+
+
+_SIZE, _SHAPE, _STREETS = "Size", "Parcel shape", "Streets"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CogenerateParams(Params):
+    """Parameters of `cogenerate`; lengths in metres, areas in m², angles in degrees."""
+
+    min_area: Annotated[
+        float | None,
+        Param(
+            help="Smallest parcel allowed; give this or the number of parcels.",
+            unit="m²",
+            above=0,
+            group=_SIZE,
+        ),
+    ] = None
+    parcels: Annotated[
+        int | None,
+        Param(
+            help="Number of parcels wanted (reached within 3 %); give this or the smallest area.",
+            minimum=1,
+            group=_SIZE,
+        ),
+    ] = None
+    pattern: Annotated[
+        StreetPattern,
+        Param(
+            help="Street pattern: loops without dead ends, dead ends in the last levels, or a "
+            "tree that keeps all its dead ends.",
+            group=_STREETS,
+            labels={
+                "loop": "Loops, no dead ends",
+                "cul-de-sac": "Cul-de-sacs in the last levels",
+                "tree": "Tree",
+            },
+        ),
+    ] = StreetPattern.LOOP
+    seed: Annotated[int, Param(help="Random seed; the same seed gives the same bytes.", minimum=0)] = 0
+    simplify: Annotated[
+        float | None,
+        Param(
+            help="Tolerance of the simplification of the boundary; by default a quarter of the "
+            "side of the smallest parcel, 0 keeps every vertex.",
+            unit="m",
+            minimum=0,
+            group=_SIZE,
+        ),
+    ] = None
+    orientation: Annotated[
+        float | None,
+        Param(
+            help="Preferred direction of the long side of parcels, counter-clockwise from "
+            "east (0 = east-west, 90 = north-south).",
+            unit="°",
+            minimum=-180,
+            maximum=180,
+            group=_SHAPE,
+        ),
+    ] = None
+    preset: Annotated[
+        Preset,
+        Param(
+            help="Weights and rules to start from: ours, or those printed in Chen et al. 2024.",
+            labels={"recommended": "Recommended", "chen2024": "Chen et al. 2024, as printed"},
+        ),
+    ] = Preset.RECOMMENDED
+    weight_size: Annotated[
+        float | None,
+        Param(
+            help="λ1: how much parcels of equal size count in choosing a cut.",
+            minimum=0,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = None
+    weight_regularity: Annotated[
+        float | None,
+        Param(
+            help="λ2: how much regular parcels count in choosing a cut.",
+            minimum=0,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = None
+    weight_access: Annotated[
+        float | None,
+        Param(
+            help="λ3: how much street access of both halves counts in choosing a cut.",
+            minimum=0,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = None
+    weight_continuity: Annotated[
+        float | None,
+        Param(
+            help="How much continuing a neighbour's cut counts in choosing a cut.",
+            minimum=0,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = None
+    weight_orientation: Annotated[
+        float,
+        Param(
+            help="How much the preferred orientation counts, where one is given.",
+            minimum=0,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = 0.3
+    access_ratio: Annotated[
+        float,
+        Param(
+            help="τ: street access over mean side length from which a half counts as reached.",
+            minimum=0,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = 0.5
+    candidates: Annotated[
+        int,
+        Param(
+            help="Number of streamline candidates for each parcel.",
+            minimum=4,
+            maximum=200,
+            advanced=True,
+            group=_SHAPE,
+        ),
+    ] = 20
+    length_weight: Annotated[
+        float,
+        Param(
+            help="How much street length counts in connecting streets.",
+            above=0,
+            advanced=True,
+            group=_STREETS,
+        ),
+    ] = 1.0
+    junction_weight: Annotated[
+        float,
+        Param(
+            help="How much a turn counts in connecting streets, in parcel sides of length.",
+            minimum=0,
+            advanced=True,
+            group=_STREETS,
+        ),
+    ] = 2.0
+    cul_de_sac_levels: Annotated[
+        int,
+        Param(
+            help="Number of last levels whose dead ends are kept in the cul-de-sac pattern.",
+            minimum=1,
+            advanced=True,
+            group=_STREETS,
+        ),
+    ] = 3
+
+    def contradictions(self) -> list[str]:
+        """Return what contradicts: the two sizes, and weights that are all zero."""
+        problems = []
+        if self.min_area is None and self.parcels is None:
+            problems.append("Give min-area (m²) or parcels (a number): one of the two is needed.")
+        if self.min_area is not None and self.parcels is not None:
+            problems.append("Give min-area or parcels, not both.")
+        if self.weights == (0.0, 0.0, 0.0):
+            problems.append(
+                "weight-size, weight-regularity and weight-access are all zero: "
+                "give at least one of them a positive value."
+            )
+        return problems
+
+    @property
+    def rules(self) -> Rules:
+        """The rules of the chosen preset."""
+        return RULES[self.preset]
+
+    @property
+    def weights(self) -> tuple[float, float, float]:
+        """λ1, λ2, λ3 of Eq. 2: what was given, else the preset's."""
+        given = (self.weight_size, self.weight_regularity, self.weight_access)
+        return tuple(  # type: ignore[return-value]
+            default if value is None else value
+            for value, default in zip(given, self.rules.weights, strict=True)
+        )
+
+    @property
+    def continuity(self) -> float:
+        """Weight of continuing a neighbour's cut: what was given, else the preset's."""
+        given = self.weight_continuity
+        return self.rules.continuity if given is None else given
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rules:
+    """What a preset decides; not for users to mix.
+
+    Parameters
+    ----------
+    weights
+        λ1, λ2, λ3 of Chen 2024, Eq. 2.
+    size_cap
+        Qsize counts as full from this ratio of the smaller to the larger half on.
+    continuity
+        Default weight of continuing a neighbour's cut (Yang 2013, section 5).
+    clearance
+        Penalty on cuts that run close to the boundary: they leave slivers at notches.
+    aligned_seeds
+        Also seed at the centroid, beside reflex corners and where neighbours' cuts end.
+    snap
+        Distance, relative to √area, within which a cut's end is moved to a parcel corner.
+    look_ahead
+        Number of street accesses whose connection is simulated; 1 takes the shortest.
+    small_block
+        Cost of each parcel that a new block has less than five.
+    """
+
+    weights: tuple[float, float, float]
+    size_cap: float
+    continuity: float
+    clearance: float
+    aligned_seeds: bool
+    snap: float
+    look_ahead: int
+    small_block: float
+
+
+RULES: dict[Preset, Rules] = {
+    Preset.RECOMMENDED: Rules(
+        weights=(0.3, 0.6, 0.1),
+        size_cap=0.7,
+        continuity=0.05,
+        clearance=0.4,
+        aligned_seeds=True,
+        snap=0.08,
+        look_ahead=6,
+        small_block=2.0,
+    ),
+    Preset.CHEN2024: Rules(
+        weights=(0.3, 0.5, 0.2),
+        size_cap=1.0,
+        continuity=0.0,
+        clearance=0.0,
+        aligned_seeds=False,
+        snap=0.0,
+        look_ahead=1,
+        small_block=0.0,
+    ),
+}
+"""The paper's preset is Eq. 2 and section 4 as printed; the recommended one is what was
+measured to make better layouts."""

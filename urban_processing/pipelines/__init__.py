@@ -1,0 +1,1 @@
+"""The algorithms as short functions of named steps."""

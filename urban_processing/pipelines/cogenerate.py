@@ -1,0 +1,298 @@
+"""Hierarchical co-generation of parcels and streets (Chen 2024, sections 3 and 4)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from urban_processing.land import default_tolerance, first_layout, simplify_site
+from urban_processing.layout import Layout, Step
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.progress import SILENT, Progress
+from urban_processing.site import Issue, Site
+from urban_processing.streets.generate import extend_streets
+from urban_processing.streets.prune import prune_streets
+from urban_processing.subdivision.holes import cut_through_holes
+from urban_processing.subdivision.level import cut_level
+from urban_processing.version import __version__
+
+MEAN_OVER_MIN = 1.37
+"""Mean parcel area over the smallest allowed one, as measured over many lands."""
+
+FLOOR_SHARE = 0.6
+"""Smallest area allowed where the number of parcels is given, over their mean area."""
+
+VERY_LARGE = 3.0
+"""Parcels above so many smallest areas are listed in the issues."""
+
+SECONDS_PER_PARCEL = 2.2e-3
+"""For the estimate that is given before a long run; one core of a common machine."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a run is expected to give."""
+
+    parcels: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything a level needs of the one before.
+
+    Parameters
+    ----------
+    layout
+        Parcels and streets so far.
+    params
+        The run's parameters.
+    min_area
+        Smallest area in m² that a cut may leave.
+    active
+        (F,) parcels that may be cut further.
+    quota
+        (F,) number of parcels that each is to become, where the total was given.
+    level
+        Number of levels so far.
+    """
+
+    layout: Layout
+    params: CogenerateParams
+    min_area: float
+    active: BoolArray
+    quota: IntArray | None
+    level: int = 0
+
+    def to_cut(self) -> IntArray:
+        """Parcels that the next level cuts."""
+        mesh = self.layout.mesh
+        can = self.active & ~self.layout.face_locked & (mesh.face_n_loops == 1)
+        if self.quota is not None:
+            return np.flatnonzero(can & (self.quota >= 2))
+        return np.flatnonzero(can & (mesh.face_area >= 2.0 * self.min_area))
+
+    @property
+    def finished(self) -> bool:
+        """Whether no parcel can be cut any more."""
+        return len(self.to_cut()) == 0
+
+
+def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT) -> Layout:
+    """Divide land into parcels that are all reached by one street network.
+
+    At each level every parcel that is large enough is cut in two (section 4.1), then streets
+    are added along parcel boundaries until every parcel is reached (section 4.2). The parts of
+    the land are worked on together, each with a network of its own.
+
+    Parameters
+    ----------
+    site
+        The land.
+    params
+        Smallest area or number of parcels, street pattern, weights.
+    progress
+        Told of every level; may cancel between levels.
+
+    Returns
+    -------
+    Layout
+        With `issues` for what could not be done and a `history` entry for this run.
+    """
+    started = time.perf_counter()
+    state = begin(site, params)
+    goal = estimate(site, params).parcels
+    while not state.finished:
+        done = math.log2(state.layout.mesh.n_faces + 1) / math.log2(goal + 2)
+        progress.update(min(done, 1.0) ** 3, _message(state))
+        state = step(state)
+    layout = finish(state)
+    progress.update(1.0, _message(state))
+    entry = Step(
+        algorithm="cogenerate",
+        parameters=params.as_dict(),
+        seed=params.seed,
+        version=__version__,
+        input_sha256=site.input_sha256,
+        seconds=time.perf_counter() - started,
+    )
+    return layout.replace(history=(*layout.history, entry))
+
+
+def _message(state: State) -> str:
+    return f"Level {state.level}, {state.layout.mesh.n_faces} parcels"
+
+
+def estimate(site: Site, params: CogenerateParams) -> Estimate:
+    """Guess the number of parcels and the seconds that a run takes."""
+    if params.parcels is not None:
+        parcels = max(params.parcels, len(site.parts))
+    else:
+        mean = MEAN_OVER_MIN * smallest_area(site, params)
+        parcels = sum(max(1, round(part.area / mean)) for part in site.parts)
+    return Estimate(parcels, parcels * SECONDS_PER_PARCEL)
+
+
+def smallest_area(site: Site, params: CogenerateParams) -> float:
+    """Smallest area in m² that a cut may leave."""
+    if params.min_area is not None:
+        return params.min_area
+    assert params.parcels is not None
+    return FLOOR_SHARE * site.area / params.parcels
+
+
+def begin(site: Site, params: CogenerateParams) -> State:
+    """The state before the first level: one parcel a part, cut through its holes."""
+    min_area = smallest_area(site, params)
+    tolerance = default_tolerance(min_area) if params.simplify is None else params.simplify
+    layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
+    quota = None if params.parcels is None else _shared_out(layout.mesh.face_area, params.parcels)
+    layout, parent = cut_through_holes(layout, min_area=min_area)
+    if quota is not None:
+        quota = _divided(quota, parent, layout.mesh.face_area)
+    state = State(
+        layout=layout,
+        params=params,
+        min_area=min_area,
+        active=np.ones(layout.mesh.n_faces, dtype=bool),
+        quota=quota,
+    )
+    return dataclasses.replace(state, layout=_with_streets(state, layout))
+
+
+def step(state: State) -> State:
+    """One level: cut all parcels that are large enough, then reach every parcel by street."""
+    faces = state.to_cut()
+    before = state.layout
+    layout, cut, parent = cut_level(
+        before,
+        faces,
+        min_area=state.min_area,
+        params=state.params,
+        quota=None if state.quota is None else state.quota[faces],
+    )
+    was_cut = np.zeros(before.mesh.n_faces, dtype=bool)
+    was_cut[faces[cut]] = True
+    active = was_cut[parent]
+    quota = None
+    if state.quota is not None:
+        kept = state.quota.copy()
+        kept[faces[~cut]] = 1
+        quota = _divided(kept, parent, layout.mesh.face_area)
+    after = dataclasses.replace(
+        state, layout=layout, active=active, quota=quota, level=state.level + 1
+    )
+    return dataclasses.replace(after, layout=_with_streets(after, layout))
+
+
+def _shared_out(area: FloatArray, total: int) -> IntArray:
+    """Divide a number of parcels over areas in proportion, at least one each."""
+    exact = area * (total / area.sum())
+    quota = np.maximum(np.floor(exact).astype(np.int64), 1)
+    missing = total - int(quota.sum())
+    if missing > 0:
+        order = np.argsort(np.round(quota - exact, 9), kind="stable")
+        quota[order[:missing]] += 1
+    while missing < 0 and (quota > 1).any():
+        # parts too small for a parcel still are one: the others give way
+        rest = np.where(quota > 1, exact / quota, np.inf)
+        quota[int(np.argmin(rest))] -= 1
+        missing += 1
+    return quota
+
+
+def _divided(quota: IntArray, parent: IntArray, area: FloatArray) -> IntArray:
+    """Divide the quotas of cut faces over their pieces in proportion to the area."""
+    order = np.argsort(parent, kind="stable")
+    start = np.flatnonzero(np.diff(parent[order], prepend=-1))
+    out = quota[parent]
+    for pieces in np.split(order, start[1:]):
+        if len(pieces) > 1:
+            out[pieces] = _shared_out(area[pieces], int(quota[parent[pieces[0]]]))
+    return out
+
+
+def _with_streets(state: State, layout: Layout) -> Layout:
+    return extend_streets(
+        layout, state.params, level=state.level, keep_ends=_keeps_ends(state)
+    )
+
+
+def _keeps_ends(state: State) -> bool:
+    """Whether dead ends of this level stay (Chen 2024, section 6: street patterns)."""
+    pattern = state.params.pattern
+    if pattern is StreetPattern.CUL_DE_SAC:
+        return _levels_left(state) < state.params.cul_de_sac_levels
+    return pattern is StreetPattern.TREE
+
+
+def _levels_left(state: State) -> int:
+    """Number of levels that are still to come, as the largest parcel suggests."""
+    faces = state.to_cut()
+    if len(faces) == 0:
+        return 0
+    if state.quota is not None:
+        return math.ceil(math.log2(int(state.quota[faces].max())))
+    largest = float(state.layout.mesh.face_area[faces].max())
+    return max(1, math.ceil(math.log2(largest / (MEAN_OVER_MIN * state.min_area))))
+
+
+def finish(state: State) -> Layout:
+    """Clean up the streets and list what the user should know."""
+    params = state.params
+    layout = prune_streets(
+        state.layout, params, keep_ends=params.pattern is not StreetPattern.LOOP
+    )
+    min_area = state.min_area
+    if state.quota is not None:
+        whole = layout.mesh.face_area >= min_area
+        min_area = float(layout.mesh.face_area[whole].min(initial=np.inf))
+        min_area = min_area if math.isfinite(min_area) else state.min_area
+    layout = layout.replace(min_area=min_area)
+    return layout.replace(issues=(*layout.issues, *_size_issues(layout)))
+
+
+def _size_issues(layout: Layout) -> list[Issue]:
+    """Parts too small for a parcel, and parcels that stayed very large."""
+    area, least = layout.mesh.face_area, layout.min_area
+    small = np.flatnonzero(area < least)
+    large = np.flatnonzero(area > VERY_LARGE * least)
+    if len(small) + len(large) == 0:
+        return []
+    polygons = layout.mesh.face_polygons()
+
+    def issue(face: int, code: str, message: str, limit: float) -> Issue:
+        return Issue(
+            code=code,
+            message=message,
+            part=int(layout.face_part[face]),
+            parcel_id=face + 1,
+            value=float(area[face]),
+            limit=limit,
+            geometry=polygons[face],
+        )
+
+    return [
+        issue(
+            f,
+            "part_below_min_area",
+            f"This part of the land ({area[f]:.0f} m²) is smaller than the smallest parcel "
+            f"allowed ({least:.0f} m²) and stays one parcel.",
+            least,
+        )
+        for f in small.tolist()
+    ] + [
+        issue(
+            f,
+            "parcel_not_cut",
+            f"No cut of this parcel ({area[f]:.0f} m²) leaves two simple halves of at least "
+            f"{least:.0f} m².",
+            VERY_LARGE * least,
+        )
+        for f in large.tolist()
+    ]

@@ -1,0 +1,91 @@
+"""The land that a layout is made on: polygons in a projected frame, ready for the engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+GRID = 2.0**-20
+"""Spacing in metres of the grid that all coordinates are kept on, relative to a whole-metre
+origin, so that shifting to map coordinates and back loses nothing."""
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the engine's local coordinates lie on the map.
+
+    Parameters
+    ----------
+    crs
+        The projected, metric CRS as text (authority code such as ``EPSG:32630``, or WKT).
+    origin
+        Whole metres in that CRS; map = local + origin.
+    """
+
+    crs: str = ""
+    origin: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Issue:
+    """Something that could not be done, or that the user should know, at a place.
+
+    `geometry` is in the frame's local coordinates; `parcel_id` is empty where no single
+    parcel is meant.
+    """
+
+    code: str
+    message: str
+    part: int | None = None
+    parcel_id: int | None = None
+    value: float | None = None
+    limit: float | None = None
+    geometry: shapely.Geometry | None = None
+
+
+@dataclass(frozen=True)
+class Site:
+    """The land, validated and in local metres.
+
+    Parameters
+    ----------
+    parts
+        Valid polygons (shell counter-clockwise, holes clockwise, on the 2^-20 m grid) that
+        do not overlap, largest first; part `i` of a layout is ``parts[i]``.
+    frame
+        The map frame of the local coordinates.
+    corners
+        (k, 2) local coordinates of corners given by the user for a freeform land; empty
+        where corners are to be found by the engine.
+    rim_is_street
+        Whether the outer rings are streets (Chen 2024, section 3: the default).
+    input_parts
+        The polygons as given, before repair and simplification, in local coordinates.
+    issues
+        What reading and repairing the boundary has to say.
+    input_sha256
+        Hash of the input, for provenance.
+    """
+
+    parts: tuple[shapely.Polygon, ...]
+    frame: Frame = Frame()
+    corners: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    rim_is_street: bool = True
+    input_parts: tuple[shapely.Polygon, ...] = ()
+    issues: tuple[Issue, ...] = ()
+    input_sha256: str = ""
+
+    @property
+    def area(self) -> float:
+        """Area of the land in m²."""
+        return float(sum(p.area for p in self.parts))
+
+
+def snap_to_grid(xy: npt.ArrayLike) -> FloatArray:
+    """Round local coordinates to the 2^-20 m grid."""
+    return np.round(np.asarray(xy, dtype=np.float64) / GRID) * GRID

@@ -1,0 +1,82 @@
+"""What new streets do to blocks: small blocks, and parcels between two parallel streets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from urban_processing.mesh.planar import OUTSIDE
+from urban_processing.streets.state import StreetState
+
+SMALL_BLOCK = 5
+"""Blocks of fewer parcels are charged for each parcel that they lack."""
+
+LARGEST_BLOCK = 20
+"""Number of parcels above which a block is split, and up to which blocks are merged."""
+
+THROUGH_COST = 0.5
+"""Cost of each parcel side of street that lies opposite another street of the same parcel."""
+
+PARALLEL = 0.8
+"""Cosine of the angle between streets from which they count as parallel."""
+
+OPPOSITE = 0.3
+"""Offset in parcel sides from which parallel streets lie on opposite sides of a parcel."""
+
+
+def layout_cost(state: StreetState, chains: Sequence[int]) -> float:
+    """Cost of the blocks and through lots that the new street `chains` make."""
+    if state.rules.small_block == 0.0:
+        return 0.0
+    small = state.rules.small_block * small_block_deficit(state, chains)
+    return small + THROUGH_COST * through_length(state, chains)
+
+
+def small_block_deficit(state: StreetState, chains: Sequence[int]) -> int:
+    """Number of parcels that the blocks beside `chains` have less than `SMALL_BLOCK`."""
+    deficit = 0
+    face, around, street = state.face, state.around, state.street
+    done: set[int] = set()
+    for chain in chains:
+        for first in (face[chain], face[chain ^ 1]):
+            if first == OUTSIDE or first in done:
+                continue
+            block = [first]
+            seen = {first}
+            for f in block:
+                for i in around[f]:
+                    if not street[i]:
+                        g = face[i ^ 1]
+                        if g != OUTSIDE and g not in seen:
+                            seen.add(g)
+                            block.append(g)
+                if len(block) >= SMALL_BLOCK:
+                    break
+            done |= seen
+            deficit += max(0, SMALL_BLOCK - len(block))
+    return deficit
+
+
+def through_length(state: StreetState, chains: Sequence[int]) -> float:
+    """Length in parcel sides of `chains` opposite another street across one parcel."""
+    total = 0.0
+    street, around, chord, middle, size = (
+        state.street,
+        state.around,
+        state.chord,
+        state.middle,
+        state.size,
+    )
+    for chain in chains:
+        along = chord[chain].conjugate()
+        here = middle[chain]
+        for f in (state.face[chain], state.face[chain ^ 1]):
+            if f == OUTSIDE:
+                continue
+            for i in around[f]:
+                if (
+                    street[i]
+                    and abs((chord[i] * along).real) > PARALLEL
+                    and abs(((middle[i] - here) * along).imag) > OPPOSITE
+                ):
+                    total += min(size[i], size[chain])
+    return total

@@ -1,0 +1,403 @@
+"""Decomposition of a layout's street edges into network edges, streets and junctions."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh, rank_cycles
+
+STRAIGHT_DEG = 135.0
+"""Street edges whose included angle is larger belong to one street (Chen 2024, section 3)."""
+
+CHORD_M = 20.0
+"""Longest chord over which the direction of a street at a junction is taken."""
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+class StreetClass(enum.StrEnum):
+    """Class of a network edge."""
+
+    RIM = "rim"
+    FIXED = "fixed"
+    COLLECTOR = "collector"
+    LOCAL = "local"
+    CUL_DE_SAC = "cul_de_sac"
+
+
+WIDTH_M = MappingProxyType(
+    {
+        StreetClass.RIM: 16.0,
+        StreetClass.FIXED: 16.0,
+        StreetClass.COLLECTOR: 16.0,
+        StreetClass.LOCAL: 12.0,
+        StreetClass.CUL_DE_SAC: 10.0,
+    }
+)
+"""Nominal width of the right-of-way by class, in metres."""
+
+
+class NodeKind(enum.IntEnum):
+    """What a node of the street network is (Chen 2024, section 3)."""
+
+    POINT = 0
+    """The arbitrary start of a ring that no other street meets."""
+    END = 1
+    JUNCTION = 2
+
+
+@dataclass(frozen=True, eq=False)
+class StreetNetwork:
+    """The street edges of a layout as K network edges, N nodes and S streets.
+
+    A network edge is a chain of street edges between nodes. Nodes are the vertices where
+    other than two street edges meet, where the rim meets an interior street, and where an
+    interior street bends by an included angle of at most `STRAIGHT_DEG`. Rim streets are
+    those on the outer ring of the land; they bend as the land does and are divided only where
+    an interior street meets them. All numbering and all directions follow from coordinates
+    alone, so that they do not depend on the order of mesh edges.
+
+    Parameters
+    ----------
+    half_edges, offsets
+        Mesh half-edges of network edge ``k``: ``half_edges[offsets[k]:offsets[k + 1]]``.
+    start, end
+        (K,) nodes; the same node for a ring.
+    edge_rim
+        (K,) whether a network edge lies on the outer ring of the land.
+    edge_part, edge_level, edge_length
+        (K,) part of the land, lowest level of its mesh edges, length in metres.
+    edge_class
+        (K,) `StreetClass`: a *cul-de-sac* leads to nothing but a street end; a *collector* is
+        another interior edge of the first half (rounded up) of the levels that have interior
+        streets; the other interior edges are *local*.
+    edge_street
+        (K,) street that a network edge belongs to. At a node the straightest pair of edges
+        continues as one street, then the straightest of the rest, while the included angle
+        is above `STRAIGHT_DEG`; rim and interior edges never pair.
+    node_vertex, node_part, node_degree
+        (N,) mesh vertex, part and number of street edges of a node.
+    node_kind
+        (N,) `NodeKind`.
+    pair_node, pair_edges, pair_deviation
+        (P,), (P, 2), (P,) every two network edges that meet at a junction without one
+        continuing the other, and 90° less the acute angle between their chords, of
+        `CHORD_M` or the edge's length, in degrees.
+    """
+
+    half_edges: IntArray
+    offsets: IntArray
+    start: IntArray
+    end: IntArray
+    edge_rim: BoolArray
+    edge_part: IntArray
+    edge_level: IntArray
+    edge_length: FloatArray
+    edge_class: npt.NDArray[np.str_]
+    edge_street: IntArray
+    node_vertex: IntArray
+    node_part: IntArray
+    node_degree: IntArray
+    node_kind: IntArray
+    pair_node: IntArray
+    pair_edges: IntArray
+    pair_deviation: FloatArray
+
+    @property
+    def n_edges(self) -> int:
+        """Number of network edges, those of the rim included."""
+        return len(self.start)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, starts of rings included."""
+        return len(self.node_vertex)
+
+    @cached_property
+    def street_rim(self) -> BoolArray:
+        """(S,) whether a street is a rim street."""
+        _, first = np.unique(self.edge_street, return_index=True)
+        return np.asarray(self.edge_rim[first])
+
+    @cached_property
+    def street_part(self) -> IntArray:
+        """(S,) part of the land that a street lies in."""
+        _, first = np.unique(self.edge_street, return_index=True)
+        return np.asarray(self.edge_part[first])
+
+    @cached_property
+    def street_length(self) -> FloatArray:
+        """(S,) length of a street in metres."""
+        length = np.bincount(self.edge_street, weights=self.edge_length)
+        return np.asarray(length, dtype=np.float64)
+
+    @cached_property
+    def edge_width(self) -> FloatArray:
+        """(K,) nominal width of the right-of-way in metres."""
+        width = {c.value: w for c, w in WIDTH_M.items()}
+        return np.array([width[c] for c in self.edge_class.tolist()], dtype=np.float64)
+
+    @cached_property
+    def node_number(self) -> IntArray:
+        """(N,) running number, from 1, of the junctions and ends; 0 for the start of a ring."""
+        counted = self.node_kind != NodeKind.POINT
+        return np.where(counted, np.cumsum(counted), 0)
+
+    @cached_property
+    def node_deviation(self) -> FloatArray:
+        """(N,) mean junction deviation in degrees; NaN where no streets meet."""
+        n = np.bincount(self.pair_node, minlength=self.n_nodes)
+        total = np.bincount(self.pair_node, weights=self.pair_deviation, minlength=self.n_nodes)
+        return np.where(n > 0, total / np.maximum(n, 1), np.nan)
+
+    @cached_property
+    def node_interior(self) -> BoolArray:
+        """(N,) whether an interior street meets or ends at a node: Chen counts only these."""
+        out = np.zeros(self.n_nodes, dtype=bool)
+        out[self.start[~self.edge_rim]] = True
+        out[self.end[~self.edge_rim]] = True
+        return out
+
+    def lines(
+        self, mesh: PlanarMesh, offset: tuple[float, float] = (0.0, 0.0)
+    ) -> npt.NDArray[np.object_]:
+        """(K,) shapely lines of the network edges, shifted by `offset`."""
+        if not self.n_edges:
+            return np.empty(0, dtype=object)
+        vertices = np.insert(
+            mesh.origin[self.half_edges],
+            self.offsets[1:],
+            mesh.target[self.half_edges[self.offsets[1:] - 1]],
+        )
+        of_vertex = np.repeat(np.arange(self.n_edges), np.diff(self.offsets) + 1)
+        lines = shapely.linestrings(mesh.xy[vertices] + np.asarray(offset), indices=of_vertex)
+        return np.asarray(lines)
+
+
+def street_network(layout: Layout) -> StreetNetwork:
+    """Decompose the street edges of a layout (Chen 2024, section 3).
+
+    Linear in the number of mesh edges, without a Python loop over them.
+    """
+    mesh = layout.mesh
+    rim = np.asarray(layout.edge_kind == EdgeKind.RIM)
+    part = layout.face_part[mesh.face.reshape(-1, 2).max(axis=1)]
+    half_edges, offsets = _network_edges(mesh, layout.edge_street, rim, part)
+    first, last = half_edges[offsets[:-1]], half_edges[offsets[1:] - 1]
+    ends = np.concatenate([mesh.origin[first], mesh.target[last]])
+    node_vertex, ends = _number_nodes(mesh, ends, np.tile(part[first >> 1], 2))
+    n_edges = len(first)
+    start, end = ends[:n_edges], ends[n_edges:]
+    degree = np.bincount(ends, minlength=len(node_vertex))
+    edge_rim = rim[first >> 1]
+    kind = np.where(degree == 1, NodeKind.END, NodeKind.JUNCTION)
+    node_part = np.zeros(len(node_vertex), dtype=np.int64)
+    node_part[ends] = np.tile(part[first >> 1], 2)
+    alone = (start == end) & (degree[start] == 2) & _is_smooth(mesh, first, last, edge_rim)
+    kind[start[alone]] = NodeKind.POINT
+    level = np.asarray(layout.edge_level[half_edges >> 1], dtype=np.int64)
+    edge_level = np.minimum.reduceat(level, offsets[:-1]) if n_edges else level
+    pair_node, pair_arms, continues = _pair_arms(mesh, first, last, ends, kind, edge_rim)
+    chord = _chords(mesh, half_edges, offsets, start == end)
+    pair_edges = pair_arms % max(n_edges, 1)
+    meet = ~continues
+    angle = _included(chord[pair_arms[meet, 0]], chord[pair_arms[meet, 1]])
+    return StreetNetwork(
+        half_edges=half_edges,
+        offsets=offsets,
+        start=start,
+        end=end,
+        edge_rim=edge_rim,
+        edge_part=part[first >> 1],
+        edge_level=edge_level,
+        edge_length=_lengths(mesh, half_edges, offsets),
+        edge_class=_classes(start, end, kind, degree, edge_rim, edge_level),
+        edge_street=_components(n_edges, pair_edges[continues]),
+        node_vertex=node_vertex,
+        node_part=node_part,
+        node_degree=degree,
+        node_kind=kind,
+        pair_node=pair_node[meet],
+        pair_edges=pair_edges[meet],
+        pair_deviation=90.0 - np.minimum(angle, 180.0 - angle),
+    )
+
+
+def _network_edges(
+    mesh: PlanarMesh, street: BoolArray, rim: BoolArray, part: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Half-edges of each network edge in order, from its lexicographically lower end."""
+    rank = _coordinate_rank(mesh)
+    half = np.flatnonzero(np.repeat(street, 2))
+    following = _continuation(mesh, half, rim)
+    starts = np.ones(len(mesh.origin), dtype=bool)
+    starts[following[following >= 0]] = False
+    # half-edges that leave a node come first, so that the leader of a cycle is one of them
+    half = half[np.lexsort((rank[mesh.target[half]], rank[mesh.origin[half]], ~starts[half]))]
+    local = np.full(len(mesh.origin), -1)
+    local[half] = np.arange(len(half))
+    # at a node the walk turns round and comes back: an open chain becomes one cycle of both
+    # its directions, a ring two cycles
+    successor = np.where(following[half] >= 0, following[half], half ^ 1)
+    leader, position = rank_cycles(local[successor])
+    other = leader[local[half ^ 1]]
+    size = np.bincount(leader, minlength=len(half))[leader]
+    kept = np.flatnonzero(((leader == other) & (2 * position < size)) | (leader < other))
+    order = kept[np.lexsort((position[kept], leader[kept], part[half[kept] >> 1]))]
+    new = np.flatnonzero(position[order] == 0)
+    return half[order], np.append(new, len(order))
+
+
+def _continuation(mesh: PlanarMesh, half: IntArray, rim: BoolArray) -> IntArray:
+    """(2E,) street half-edge that goes on from the head of one; -1 where a node stops it."""
+    out = np.full(len(mesh.origin), -1)
+    degree = np.bincount(mesh.origin[half], minlength=mesh.n_vertices)
+    by_origin = half[np.argsort(mesh.origin[half], kind="stable")]
+    twos = np.searchsorted(mesh.origin[by_origin], np.flatnonzero(degree == 2))
+    a, b = by_origin[twos], by_origin[twos + 1]
+    rim_a, rim_b = rim[a >> 1], rim[b >> 1]
+    d = _directions(mesh)
+    on = (rim_a == rim_b) & (rim_a | (_included(d[a], d[b]) > STRAIGHT_DEG))
+    out[a[on] ^ 1] = b[on]
+    out[b[on] ^ 1] = a[on]
+    return out
+
+
+def _number_nodes(mesh: PlanarMesh, ends: IntArray, part: IntArray) -> tuple[IntArray, IntArray]:
+    """Vertices of the nodes, by part and coordinates, and the nodes of the given vertices."""
+    vertex, first = np.unique(ends, return_index=True)
+    order = np.lexsort((_coordinate_rank(mesh)[vertex], part[first]))
+    node_of = np.full(mesh.n_vertices, -1)
+    node_of[vertex[order]] = np.arange(len(vertex))
+    return vertex[order], node_of[ends]
+
+
+def _is_smooth(mesh: PlanarMesh, first: IntArray, last: IntArray, rim: BoolArray) -> BoolArray:
+    """Whether each network edge, if it is a ring, closes without a bend."""
+    d = _directions(mesh)
+    return np.asarray(rim | (_included(d[first], d[last ^ 1]) > STRAIGHT_DEG))
+
+
+def _pair_arms(
+    mesh: PlanarMesh,
+    first: IntArray,
+    last: IntArray,
+    arm_node: IntArray,
+    node_kind: IntArray,
+    edge_rim: BoolArray,
+) -> tuple[IntArray, IntArray, BoolArray]:
+    """All pairs of arms at junctions, and which of them continue as one street.
+
+    Arm ``k`` is the start of network edge ``k``, arm ``K + k`` its end.
+    """
+    arms = np.flatnonzero(node_kind[arm_node] == NodeKind.JUNCTION)
+    arms = arms[np.lexsort((arms % max(len(first), 1), arm_node[arms]))]
+    node = arm_node[arms]
+    beyond = np.searchsorted(node, node, side="right") - np.arange(len(arms)) - 1
+    i = np.repeat(np.arange(len(arms)), beyond)
+    j = i + 1 + np.arange(len(i)) - np.repeat(np.cumsum(beyond) - beyond, beyond)
+    pairs = np.column_stack([arms[i], arms[j]])
+    direction = _directions(mesh)[np.concatenate([first, last ^ 1])]
+    included = np.round(_included(direction[pairs[:, 0]], direction[pairs[:, 1]]), 6)
+    rim = np.tile(edge_rim, 2)[pairs]
+    straight = np.flatnonzero((included > STRAIGHT_DEG) & (rim[:, 0] == rim[:, 1]))
+    straight = straight[np.lexsort((straight, -included[straight]))]
+    continues = np.zeros(len(pairs), dtype=bool)
+    taken = np.zeros(len(arm_node), dtype=bool)
+    for pair in straight.tolist():  # straightest first; each arm once
+        if not taken[pairs[pair]].any():
+            taken[pairs[pair]] = True
+            continues[pair] = True
+    return node[i], pairs, continues
+
+
+def _chords(
+    mesh: PlanarMesh, half_edges: IntArray, offsets: IntArray, is_ring: BoolArray
+) -> ComplexArray:
+    """Direction of each arm, from its node to the point `CHORD_M` along the edge."""
+    n = len(offsets) - 1
+    z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
+    step = mesh.edge_length[half_edges >> 1]
+    total = np.append(0.0, np.cumsum(step))
+    low, high = total[offsets[:-1]], total[offsets[1:]]
+    reach = np.minimum(CHORD_M, np.where(is_ring, 0.5, 1.0) * (high - low))
+    where = np.concatenate([low + reach, high - reach])
+    at = np.searchsorted(total, where, side="right") - 1
+    at = np.clip(at, np.tile(offsets[:-1], 2), np.tile(offsets[1:], 2) - 1)
+    h = half_edges[at]
+    share = np.clip((where - total[at]) / step[at], 0.0, 1.0)
+    point = z[mesh.origin[h]] + share * (z[mesh.target[h]] - z[mesh.origin[h]])
+    node = np.concatenate(
+        [z[mesh.origin[half_edges[offsets[:n]]]], z[mesh.target[half_edges[offsets[1:] - 1]]]]
+    )
+    return np.asarray(point - node)
+
+
+def _classes(
+    start: IntArray,
+    end: IntArray,
+    node_kind: IntArray,
+    node_degree: IntArray,
+    rim: BoolArray,
+    level: IntArray,
+) -> npt.NDArray[np.str_]:
+    """(K,) class of each network edge, by the rule that `StreetNetwork` states."""
+    out = np.full(len(start), StreetClass.LOCAL.value, dtype="<U10")
+    levels = np.unique(level[~rim])
+    if len(levels):
+        out[level <= levels[(len(levels) - 1) // 2]] = StreetClass.COLLECTOR.value
+    # edges that follow one another at bends lead to the same places
+    edges, nodes = np.tile(np.arange(len(start)), 2), np.concatenate([start, end])
+    bend = np.flatnonzero((node_degree[nodes] == 2) & ~rim[edges])
+    bend = bend[np.argsort(nodes[bend], kind="stable")]
+    two = np.flatnonzero(nodes[bend[1:]] == nodes[bend[:-1]])
+    run = _components(len(start), edges[np.column_stack([bend[two], bend[two + 1]])])
+    at_end = (node_kind[start] == NodeKind.END) | (node_kind[end] == NodeKind.END)
+    out[np.isin(run, run[at_end])] = StreetClass.CUL_DE_SAC.value
+    out[rim] = StreetClass.RIM.value
+    return out
+
+
+def _components(n: int, pairs: IntArray) -> IntArray:
+    """(n,) component of each of n things joined by pairs, numbered by their lowest member."""
+    if n == 0:
+        return np.empty(0, dtype=np.int64)
+    ones = np.ones(len(pairs), dtype=np.int8)
+    _, label = connected_components(
+        coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(n, n)), directed=False
+    )
+    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[inverse]
+
+
+def _lengths(mesh: PlanarMesh, half_edges: IntArray, offsets: IntArray) -> FloatArray:
+    length = mesh.edge_length[half_edges >> 1]
+    return np.add.reduceat(length, offsets[:-1]) if len(length) else length
+
+
+def _coordinate_rank(mesh: PlanarMesh) -> IntArray:
+    """(V,) place of each vertex when sorted by x, then y."""
+    rank = np.empty(mesh.n_vertices, dtype=np.int64)
+    rank[np.lexsort((mesh.xy[:, 1], mesh.xy[:, 0]))] = np.arange(mesh.n_vertices)
+    return rank
+
+
+def _directions(mesh: PlanarMesh) -> ComplexArray:
+    """(2E,) vector of each half-edge."""
+    d = mesh.xy[mesh.target] - mesh.xy[mesh.origin]
+    return np.asarray(d[:, 0] + 1j * d[:, 1])
+
+
+def _included(a: ComplexArray, b: ComplexArray) -> FloatArray:
+    """Angle in degrees between directions that leave the same point: 180 where straight on."""
+    return np.asarray(np.abs(np.degrees(np.angle(a * np.conj(b)))))

@@ -1,0 +1,223 @@
+"""The working state of one level of street generation: the corner graph as plain lists."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.corner_graph import CornerGraph
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
+from urban_processing.params import CogenerateParams
+from urban_processing.streets.access_rule import required_frontage
+
+STRAIGHT = math.radians(45.0)
+"""Two chains are collinear while the turn between them is less, that is, while their included
+angle is more than 135° (Chen 2024, section 4.2)."""
+
+FAR = 1e9
+"""Distance of nodes from which no street can be reached."""
+
+
+class StreetState:
+    """Streets being added to one layout, with an undo journal.
+
+    Everything is indexed by the directed chains, nodes and faces of the layout's corner
+    graph; lists instead of arrays, because the searches touch a few elements at a time.
+    Lengths called `size` are in parcel sides (the square root of the mean parcel area) times
+    the length weight: the unit of all costs.
+    """
+
+    def __init__(self, layout: Layout, params: CogenerateParams) -> None:
+        graph = layout.corner_graph
+        mesh = layout.mesh
+        self.layout = layout
+        self.graph = graph
+        self.rules = params.rules
+        self.turn_cost = params.junction_weight
+        self.side = math.sqrt(float(mesh.face_area.mean()))
+        interior = layout.chain_kind == EdgeKind.INTERIOR
+        usable = interior | layout.chain_street
+        self.interior: list[bool] = interior.tolist()
+        self.usable: list[bool] = usable.tolist()
+        self.street: list[bool] = layout.chain_street.tolist()
+        self.start: list[int] = graph.start.tolist()
+        self.end: list[int] = graph.end.tolist()
+        self.face: list[int] = graph.face.tolist()
+        self.length: list[float] = graph.length.tolist()
+        self.size: list[float] = (graph.length * (params.length_weight / self.side)).tolist()
+        self.out = _ragged(graph.out, graph.out_offsets)
+        self.around = _ragged(graph.around, graph.around_offsets)
+        self.ahead, self.aside, self.follow = _successors(graph, usable)
+        streets = np.flatnonzero(layout.chain_street)
+        self.degree: list[int] = np.bincount(
+            graph.start[streets], minlength=graph.n_nodes
+        ).tolist()
+        self.frontage: list[float] = layout.frontage.tolist()
+        self.need: list[float] = _needs(layout, usable).tolist()
+        self.part: list[int] = layout.face_part.tolist()
+        self.journal: list[int] = []
+        self.part_has_streets: list[bool] = _parts_with_streets(layout)
+        self.part_has_street_rim: list[bool] = _parts_with_street_rim(layout)
+        z = mesh.xy[graph.node_vertex] @ np.array([1.0, 1.0j]) / self.side
+        a, b = z[graph.start], z[graph.end]
+        chord = np.where(a == b, graph.leaving, b - a)
+        self.chord: list[complex] = (chord / np.abs(chord)).tolist()
+        self.middle: list[complex] = (0.5 * (a + b)).tolist()
+
+    def add(self, chain: int) -> None:
+        """Make a chain street."""
+        if self.street[chain]:
+            return
+        self._set(chain, True)
+        self.journal.append(chain)
+
+    def remove(self, chain: int) -> None:
+        """Make a street chain none."""
+        self._set(chain, False)
+        self.journal.append(~chain)
+
+    def undo(self, mark: int) -> None:
+        """Take back everything since the journal had `mark` entries."""
+        journal = self.journal
+        while len(journal) > mark:
+            entry = journal.pop()
+            if entry >= 0:
+                self._set(entry, False)
+            else:
+                self._set(~entry, True)
+
+    def _set(self, chain: int, on: bool) -> None:
+        sign = 1 if on else -1
+        self.street[chain] = self.street[chain ^ 1] = on
+        self.degree[self.start[chain]] += sign
+        self.degree[self.end[chain]] += sign
+        length = sign * self.length[chain]
+        for face in (self.face[chain], self.face[chain ^ 1]):
+            if face != OUTSIDE:
+                self.frontage[face] += length
+
+    def is_reached(self, face: int) -> bool:
+        """Whether a parcel has the frontage it needs, or all that it can have."""
+        return self.frontage[face] >= self.need[face]
+
+    def street_mask(self) -> BoolArray:
+        """(M,) which chains are street now."""
+        return np.array(self.street, dtype=bool)
+
+    def network_distance(self) -> list[float]:
+        """Distance in parcel sides of every node from the nearest street node."""
+        graph = self.graph
+        sources = np.flatnonzero(np.array(self.degree) > 0)
+        if not len(sources):
+            return [0.0] * graph.n_nodes
+        ok = np.flatnonzero(np.array(self.usable))
+        weights = np.array(self.size)[ok] + 1e-12
+        links = coo_matrix(
+            (weights, (graph.start[ok], graph.end[ok])), shape=(graph.n_nodes, graph.n_nodes)
+        )
+        distance = dijkstra(links.tocsr(), indices=sources, min_only=True)
+        return np.where(np.isfinite(distance), distance, FAR).tolist()
+
+    def network_components(self) -> tuple[int, IntArray]:
+        """Number of connected components of the streets, and the component of each node.
+
+        Nodes without a street get -1.
+        """
+        graph = self.graph
+        on = np.flatnonzero(self.street_mask())
+        n = graph.n_nodes
+        links = coo_matrix((np.ones(len(on)), (graph.start[on], graph.end[on])), shape=(n, n))
+        _, label = connected_components(links, directed=False)
+        used = np.array(self.degree) > 0
+        names, compact = np.unique(label[used], return_inverse=True)
+        out = np.full(n, -1)
+        out[used] = compact
+        return len(names), out
+
+    def blocks(self) -> IntArray:
+        """(F,) block of each parcel: what the streets enclose together."""
+        graph = self.graph
+        n = len(self.around)
+        left, right = graph.face[0::2], graph.face[1::2]
+        open_ = ~self.street_mask()[0::2] & (left != OUTSIDE) & (right != OUTSIDE)
+        links = coo_matrix((np.ones(int(open_.sum())), (left[open_], right[open_])), shape=(n, n))
+        _, label = connected_components(links, directed=False)
+        return np.asarray(label, dtype=np.int64)
+
+    def finish(self, *, level: int) -> Layout:
+        """Return the layout with the streets as they are now."""
+        layout = self.layout
+        before, now = layout.chain_street, self.street_mask()
+        added, removed = np.flatnonzero(now & ~before), np.flatnonzero(before & ~now)
+        if not len(added) and not len(removed):
+            return layout
+        edge_street, edge_level = layout.edge_street.copy(), layout.edge_level.copy()
+        new, old = self.graph.edges_of(added), self.graph.edges_of(removed)
+        edge_street[new], edge_level[new] = True, level
+        edge_street[old], edge_level[old] = False, -1
+        return layout.replace(edge_street=edge_street, edge_level=edge_level)
+
+
+def _ragged(values: IntArray, offsets: IntArray) -> list[list[int]]:
+    flat: list[int] = values.tolist()
+    return [flat[a:b] for a, b in pairwise(offsets.tolist())]
+
+
+def _successors(
+    graph: CornerGraph, usable: BoolArray
+) -> tuple[list[list[int]], list[list[int]], list[int]]:
+    """Usable chains that continue each chain straight on and with a turn; the straightest."""
+    n = graph.n_chains
+    counts = np.diff(graph.out_offsets)[graph.end]
+    before = np.repeat(np.arange(n), counts)
+    first = np.repeat(graph.out_offsets[graph.end] - (np.cumsum(counts) - counts), counts)
+    after = graph.out[first + np.arange(len(before))]
+    keep = (after != before ^ 1) & usable[after] & usable[before]
+    before, after = before[keep], after[keep]
+    cosine = (graph.leaving[after] * graph.arriving[before].conj()).real
+    straight = cosine > math.cos(STRAIGHT)
+    follow = np.full(n, -1)
+    order = np.lexsort((cosine, before))
+    order = order[straight[order]]
+    follow[before[order]] = after[order]
+    bounds = np.arange(n + 1)
+    ahead = _ragged(after[straight], np.searchsorted(before[straight], bounds))
+    aside = _ragged(after[~straight], np.searchsorted(before[~straight], bounds))
+    return ahead, aside, follow.tolist()
+
+
+def _parts_with_streets(layout: Layout) -> list[bool]:
+    """Whether each part of the land has a street that its parcels can be connected with."""
+    has = np.zeros(int(layout.face_part.max()) + 1, dtype=bool)
+    face = layout.mesh.face[np.repeat(layout.edge_street, 2)]
+    has[layout.face_part[face[face != OUTSIDE]]] = True
+    return has.tolist()
+
+
+def _parts_with_street_rim(layout: Layout) -> list[bool]:
+    """Whether the whole outer rim of each part of the land is street."""
+    has = np.ones(int(layout.face_part.max()) + 1, dtype=bool)
+    bare = (layout.edge_kind == EdgeKind.RIM) & ~layout.edge_street
+    face = layout.mesh.face[np.repeat(bare, 2)]
+    has[layout.face_part[face[face != OUTSIDE]]] = False
+    return has.tolist()
+
+
+def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
+    """(F,) frontage each parcel needs: by the rule, but no more than it can have."""
+    graph = layout.corner_graph
+    inside = usable & (graph.face != OUTSIDE)
+    possible = np.bincount(
+        graph.face[inside], weights=graph.length[inside], minlength=layout.mesh.n_faces
+    )
+    # the sum of a parcel's chains may miss the sum of its edges by a rounding error
+    need = np.minimum(
+        required_frontage(layout.mesh.face_area) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
+    )
+    need[layout.face_locked] = 0.0
+    return need

@@ -1,0 +1,1 @@
+"""Strategies that cut parcels in two."""

@@ -1,0 +1,191 @@
+"""Streamline cuts (Chen 2024, section 4.1; Yang 2013, section 5) for a level in one batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urban_processing.fields.cross import sample_field
+from urban_processing.fields.rings import ComplexArray, RingBatch
+from urban_processing.mesh.corners import simplified_vertices
+from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.subdivision.cuts import (
+    Cuts,
+    halving_cuts,
+    join_cuts,
+    place_seeds,
+    streamline_cuts,
+)
+from urban_processing.subdivision.parcels import Boundary, ParcelRings, boundaries
+from urban_processing.subdivision.score import rank_cuts, score_cuts
+
+FIELD_TOLERANCE = 0.004
+"""The field sees rings simplified by this share of √area: collinear vertices cost time."""
+
+HALVED_BELOW = 3.2
+"""Parcels below this many smallest areas also get straight cuts that halve them exactly."""
+
+HALVED_QUOTA = 5
+"""So do parcels that are to become this many or fewer; the shares then follow the number."""
+
+ALIGNED_SEEDS = 5
+"""Seeds of a parcel that the aligned ones replace."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A cut of one parcel.
+
+    Parameters
+    ----------
+    edge_a, along_a, edge_b, along_b
+        Ends: place in the parcel's ring of half-edges, and place (0 to 1) on that half-edge.
+    path
+        (n, 2) map positions from a to b, ends included.
+    quality
+        Score, the larger the better.
+    """
+
+    edge_a: int
+    along_a: float
+    edge_b: int
+    along_b: float
+    path: FloatArray
+    quality: float
+
+
+def propose_cuts(
+    parcels: ParcelRings,
+    *,
+    min_area: float,
+    params: CogenerateParams,
+    quota: IntArray | None = None,
+    thorough: bool = False,
+) -> list[list[Cut]]:
+    """Ranked cuts of each parcel, best first; an empty list where no cut is legal.
+
+    Parameters
+    ----------
+    min_area
+        Smallest area in m² that either half may have.
+    quota
+        (P,) number of parcels that each is to become in the end, where that is given.
+    thorough
+        More seeds, a finer field and no snapping, for parcels whose first cuts failed.
+    """
+    out: list[list[Cut]] = [[] for _ in range(len(parcels.face))]
+    few = len(parcels.face) < 16
+    size = 48 if few or thorough else 24 if len(parcels.face) < 128 else 18
+    field_vertices = simplified_vertices(parcels.xy, parcels.offsets, FIELD_TOLERANCE)
+    quotas = np.zeros(len(parcels.face), dtype=np.int64) if quota is None else quota
+    for rows in parcels.chunks(16 * 64):
+        boundary = boundaries(parcels, rows)
+        cuts = _candidates(
+            parcels,
+            boundary,
+            rows,
+            field_vertices,
+            size,
+            _halved_shares(boundary, quotas[rows], min_area),
+            params,
+            thorough=thorough,
+        )
+        scored = score_cuts(
+            boundary,
+            cuts,
+            min_share=min_area / boundary.rings.scale**2,
+            quota=quotas[rows],
+            params=params,
+            snap=0.0 if thorough else params.rules.snap,
+        )
+        chosen, rank = rank_cuts(boundary, scored)
+        order = np.lexsort((rank, cuts.parcel[chosen]))
+        chosen = chosen[order]
+        for i, path in zip(chosen.tolist(), cuts.paths(chosen), strict=True):
+            parcel = cuts.parcel[i]
+            cut = _as_cut(
+                boundary, int(parcel), scored.t_a[i], scored.t_b[i], path, scored.quality[i]
+            )
+            out[rows[parcel]].append(cut)
+    return out
+
+
+def _candidates(
+    parcels: ParcelRings,
+    boundary: Boundary,
+    rows: IntArray,
+    field_vertices: IntArray,
+    size: int,
+    halved: FloatArray,
+    params: CogenerateParams,
+    *,
+    thorough: bool,
+) -> Cuts:
+    """Streamlines, and straight halvings where the parcel is small."""
+    rings, field_t = _field_rings(parcels, boundary, rows, field_vertices)
+    field = sample_field(rings, size)
+    wanted = params.candidates // 2 * (3 if thorough else 1)
+    aligned = params.rules.aligned_seeds or thorough
+    seeds = place_seeds(
+        boundary,
+        field,
+        parcels.lineage[rows],
+        seed=params.seed,
+        wanted=max(wanted - (ALIGNED_SEEDS if aligned else 0), 3),
+        aligned=aligned,
+    )
+    sets = [streamline_cuts(boundary, rings, field, field_t, seeds)]
+    small = np.flatnonzero(halved > 0)
+    if len(small):
+        sets.append(halving_cuts(boundary, field, small, halved[small]))
+        uneven = small[halved[small] != 0.5]
+        if len(uneven):
+            sets.append(halving_cuts(boundary, field, uneven, 1.0 - halved[uneven]))
+    return join_cuts(sets)
+
+
+def _halved_shares(boundary: Boundary, quota: IntArray, min_area: float) -> FloatArray:
+    """Share of the area that straight cuts are to leave on one side; 0 for no such cuts."""
+    small = boundary.rings.scale**2 < HALVED_BELOW * min_area
+    by_quota = np.where(quota <= HALVED_QUOTA, (quota // 2) / np.maximum(quota, 1), 0.0)
+    return np.asarray(np.where(quota > 0, by_quota, np.where(small, 0.5, 0.0)))
+
+
+def _field_rings(
+    parcels: ParcelRings, boundary: Boundary, rows: IntArray, kept: IntArray
+) -> tuple[RingBatch, FloatArray]:
+    """Simplified rings of a batch, and the length along the full ring at their vertices."""
+    cuts = np.searchsorted(kept, parcels.offsets)
+    start, count = cuts[rows], np.diff(cuts)[rows]
+    width = int(count.max())
+    column = np.minimum(np.arange(width)[None], count[:, None] - 1)
+    place = kept[start[:, None] + column] - parcels.offsets[rows][:, None]
+    index = np.arange(len(rows))[:, None]
+    full = boundary.rings
+    z: ComplexArray = full.z[index, place]
+    t = boundary.t[index, place]
+    close = t[:, :1] + boundary.perimeter[:, None]
+    rings = RingBatch(z, count, full.centre, full.scale, full.axis)
+    return rings, np.concatenate([t, close], axis=1)
+
+
+def _as_cut(
+    boundary: Boundary, row: int, t_a: float, t_b: float, path: ComplexArray, quality: float
+) -> Cut:
+    """A cut in terms of the mesh: half-edges of the ring and map positions."""
+    rows, t = np.array([row, row]), np.array([t_a, t_b])
+    edge, along = boundary.locate(rows, t)
+    edge = np.minimum(edge, boundary.rings.count[row] - 1)
+    ends = boundary.position(rows, t)
+    path = _moved_ends(path, ends[0], ends[1])
+    xy = boundary.rings.to_map(np.full(len(path), row), path)
+    return Cut(int(edge[0]), float(along[0]), int(edge[1]), float(along[1]), xy, float(quality))
+
+
+def _moved_ends(path: ComplexArray, a: complex, b: complex) -> ComplexArray:
+    """Move the ends of a path; the points between follow in proportion to the length."""
+    length = np.append(0.0, np.cumsum(np.abs(np.diff(path))))
+    s = length / length[-1] if length[-1] > 0 else np.linspace(0.0, 1.0, len(path))
+    return np.asarray(path + (1 - s) * (a - path[0]) + s * (b - path[-1]))
