@@ -155,7 +155,7 @@ def _pieces(
     starts = is_node[layout.mesh.origin[network.half_edges]]
     starts[network.offsets[:-1]] = True
     first = np.flatnonzero(starts)
-    last = np.append(first[1:], len(starts)) - 1
+    last = np.append(first, len(starts))[1:] - 1
     step = layout.mesh.edge_length[network.half_edges >> 1]
     return first, last, np.add.reduceat(step, first) if len(first) else step
 

@@ -20,7 +20,7 @@ import shapely
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
 from urban_processing.errors import BoundaryError, OutputError, TopologyError
-from urban_processing.io.geopackage import METADATA_KEY, write_geopackage
+from urban_processing.io.geopackage import read_state, write_geopackage
 from urban_processing.io.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.layout import Layout, Step
 from urban_processing.metrics.tables import layout_tables
@@ -79,7 +79,7 @@ def write_layout(
     layout = canonical(layout)
     with _replacing(target) as temporary:
         write_geopackage(
-            temporary, layout_tables(layout), crs=layout.frame.crs, metadata=_state(layout)
+            temporary, layout_tables(layout), crs=layout.frame.crs, state=_state(layout)
         )
     return target
 
@@ -184,17 +184,12 @@ def _state(layout: Layout) -> str:
 def _read_state(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise BoundaryError(f"The file {path} does not exist.")
-    no_layout = f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."
-    try:
-        names = set(pyogrio.list_layers(path)[:, 0])
-        if not {PARCELS.name, STREETS.name} <= names:
-            raise BoundaryError(no_layout)
-        metadata = pyogrio.read_info(path, layer=PARCELS.name)["dataset_metadata"] or {}
-    except DataSourceError as error:
-        raise BoundaryError(no_layout) from error
-    if METADATA_KEY not in metadata:
-        raise BoundaryError(no_layout)
-    state: dict[str, Any] = json.loads(metadata[METADATA_KEY])
+    text = read_state(path)
+    if text is None:
+        raise BoundaryError(
+            f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."
+        )
+    state: dict[str, Any] = json.loads(text)
     if state["format"] > FILE_FORMAT:
         raise BoundaryError(
             f"{path} was written by a newer version of this software: update to read it."

@@ -16,7 +16,7 @@ import shapely
 
 from urban_processing.io.styles import layer_style
 from urban_processing.metrics.tables import Table
-from urban_processing.schema import LAYERS, ColumnType, GeometryType, Layer
+from urban_processing.schema import LAYERS, Column, ColumnType, GeometryType, Layer
 
 VERSION = "1.3"
 """GeoPackage version: the newest that QGIS 3.22 reads."""
@@ -24,8 +24,9 @@ VERSION = "1.3"
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 """Date that files carry in place of the day they were written on."""
 
-METADATA_KEY = "urban_processing_layout"
-"""Item of the file's metadata that holds what the tables do not."""
+STATE_URI = "urn:urban-processing:layout"
+"""Standard of the metadata row that holds what the tables do not say. Metadata under GDAL's own
+standard would make GDAL leave an .aux.xml file beside the GeoPackage."""
 
 _GEOMETRY_COLUMN = "geom"
 
@@ -38,13 +39,26 @@ CREATE TABLE "layer_styles" (
   "update_time" DATETIME)
 """
 
+_METADATA_TABLES = """
+CREATE TABLE gpkg_metadata (
+  id INTEGER CONSTRAINT m_pk PRIMARY KEY ASC NOT NULL,
+  md_scope TEXT NOT NULL DEFAULT 'dataset', md_standard_uri TEXT NOT NULL,
+  mime_type TEXT NOT NULL DEFAULT 'text/xml', metadata TEXT NOT NULL DEFAULT '');
+CREATE TABLE gpkg_metadata_reference (
+  reference_scope TEXT NOT NULL, table_name TEXT, column_name TEXT, row_id_value INTEGER,
+  timestamp DATETIME NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')),
+  md_file_id INTEGER NOT NULL, md_parent_id INTEGER,
+  CONSTRAINT crmr_mfi_fk FOREIGN KEY (md_file_id) REFERENCES gpkg_metadata(id),
+  CONSTRAINT crmr_mpi_fk FOREIGN KEY (md_parent_id) REFERENCES gpkg_metadata(id));
+"""
+
 _COLUMN_TABLES = """
-CREATE TABLE IF NOT EXISTS gpkg_data_columns (
+CREATE TABLE gpkg_data_columns (
   table_name TEXT NOT NULL, column_name TEXT NOT NULL, name TEXT, title TEXT,
   description TEXT, mime_type TEXT, constraint_name TEXT,
   CONSTRAINT pk_gdc PRIMARY KEY (table_name, column_name),
   CONSTRAINT gdc_tn UNIQUE (table_name, name));
-CREATE TABLE IF NOT EXISTS gpkg_data_column_constraints (
+CREATE TABLE gpkg_data_column_constraints (
   constraint_name TEXT NOT NULL, constraint_type TEXT NOT NULL, value TEXT, min NUMERIC,
   min_is_inclusive BOOLEAN, max NUMERIC, max_is_inclusive BOOLEAN, description TEXT,
   CONSTRAINT gdcc_ntv UNIQUE (constraint_name, constraint_type, value));
@@ -52,7 +66,7 @@ CREATE TABLE IF NOT EXISTS gpkg_data_column_constraints (
 
 
 def write_geopackage(
-    path: Path, tables: Mapping[str, Table], *, crs: str, metadata: str = ""
+    path: Path, tables: Mapping[str, Table], *, crs: str, state: str
 ) -> None:
     """Write tables as the layers of a new GeoPackage, with QGIS styles and column names.
 
@@ -64,20 +78,15 @@ def write_geopackage(
         Tables by name of the layer, of layers in the schema; written in its order.
     crs
         CRS of the geometries as text, "" for none.
-    metadata
-        Text kept under `METADATA_KEY`.
+    state
+        JSON kept in the file's metadata, for `read_state`.
     """
     layers = [layer for layer in LAYERS if layer.name in tables]
     with _gdal_options(OGR_CURRENT_DATE=FIXED_DATE):
-        for number, layer in enumerate(layers):
-            _write_layer(
-                path,
-                layer,
-                tables[layer.name],
-                crs=crs,
-                dataset_metadata={METADATA_KEY: metadata} if metadata and not number else None,
-            )
+        for layer in layers:
+            _write_layer(path, layer, tables[layer.name], crs=crs)
     with closing(sqlite3.connect(path)) as connection, connection:
+        _write_state(connection, state)
         _write_styles(connection, layers)
         _write_column_names(connection, layers)
 
@@ -101,14 +110,19 @@ def field_arrays(
     return names, values, masks
 
 
-def _write_layer(
-    path: Path,
-    layer: Layer,
-    table: Table,
-    *,
-    crs: str,
-    dataset_metadata: Mapping[str, str] | None,
-) -> None:
+def read_state(path: Path) -> str | None:
+    """Return the state of a file that `write_geopackage` wrote, None for any other file."""
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as connection:
+            row = connection.execute(
+                "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (STATE_URI,)
+            ).fetchone()
+    except sqlite3.DatabaseError:
+        return None  # no database, or one without metadata
+    return None if row is None else str(row[0])
+
+
+def _write_layer(path: Path, layer: Layer, table: Table, *, crs: str) -> None:
     names, values, masks = field_arrays(layer, table)
     spatial = layer.geometry is not GeometryType.NONE and table.geometry is not None
     options: dict[str, Any] = {"layer_options": {"IDENTIFIER": layer.title}}
@@ -131,9 +145,35 @@ def _write_layer(
             driver="GPKG",
             encoding="UTF-8",
             dataset_options={"VERSION": VERSION},
-            dataset_metadata=dataset_metadata,
             **options,
         )
+
+
+def _write_state(connection: sqlite3.Connection, state: str) -> None:
+    connection.executescript(_METADATA_TABLES)
+    connection.execute(
+        "INSERT INTO gpkg_metadata VALUES (1, 'dataset', ?, 'application/json', ?)",
+        (STATE_URI, state),
+    )
+    connection.execute(
+        "INSERT INTO gpkg_metadata_reference VALUES ('geopackage', NULL, NULL, NULL, ?, 1, NULL)",
+        (FIXED_DATE,),
+    )
+    _register(
+        connection,
+        "gpkg_metadata",
+        "http://www.geopackage.org/spec120/#extension_metadata",
+        tables=("gpkg_metadata", "gpkg_metadata_reference"),
+    )
+
+
+def _register(
+    connection: sqlite3.Connection, extension: str, definition: str, *, tables: tuple[str, ...]
+) -> None:
+    connection.executemany(
+        "INSERT INTO gpkg_extensions VALUES (?, NULL, ?, ?, 'read-write')",
+        [(table, extension, definition) for table in tables],
+    )
 
 
 def _write_styles(connection: sqlite3.Connection, layers: list[Layer]) -> None:
@@ -145,7 +185,7 @@ def _write_styles(connection: sqlite3.Connection, layers: list[Layer]) -> None:
         (FIXED_DATE,),
     )
     for layer in layers:
-        qml = layer_style(layer.name, aliases={c.name: _alias(c.alias, c.unit) for c in layer.columns})
+        qml = layer_style(layer.name, aliases={c.name: _alias(c) for c in layer.columns})
         if qml is not None:
             connection.execute(
                 "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name,"
@@ -158,24 +198,25 @@ def _write_styles(connection: sqlite3.Connection, layers: list[Layer]) -> None:
 def _write_column_names(connection: sqlite3.Connection, layers: list[Layer]) -> None:
     """Readable names and descriptions of columns, by the GeoPackage schema extension."""
     connection.executescript(_COLUMN_TABLES)
-    connection.executemany(
-        "INSERT INTO gpkg_extensions VALUES (?, NULL, 'gpkg_schema',"
-        " 'http://www.geopackage.org/spec121/#extension_schema', 'read-write')",
-        [("gpkg_data_columns",), ("gpkg_data_column_constraints",)],
+    _register(
+        connection,
+        "gpkg_schema",
+        "http://www.geopackage.org/spec121/#extension_schema",
+        tables=("gpkg_data_columns", "gpkg_data_column_constraints"),
     )
     connection.executemany(
         "INSERT INTO gpkg_data_columns (table_name, column_name, name, title, description)"
         " VALUES (?, ?, ?, ?, ?)",
         [
-            (layer.name, c.name, _alias(c.alias, c.unit), _alias(c.alias, c.unit), c.description)
+            (layer.name, c.name, _alias(c), _alias(c), c.description)
             for layer in layers
             for c in layer.columns
         ],
     )
 
 
-def _alias(alias: str, unit: str) -> str:
-    return f"{alias} [{unit}]" if unit else alias
+def _alias(column: Column) -> str:
+    return f"{column.alias} [{column.unit}]" if column.unit else column.alias
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from urban_processing.mesh.planar import OUTSIDE
+from urban_processing.streets.paths import UNCLOSED_COST
 from urban_processing.streets.state import FAR, StreetState
 
 MISSED = 2.0
@@ -82,7 +83,14 @@ def _way(
     to_network = [0.0 if state.degree[v] else distance[v] for v in nodes]
     if min(to_network) >= FAR:
         return 0.0
-    return min(to_network) if keep_ends else to_network[0] + to_network[-1]
+    if keep_ends:
+        return min(to_network)
+    way = to_network[0] + to_network[-1]
+    for last in (chains[-1], first ^ 1):
+        stuck = not state.ahead[last] and not state.aside[last]
+        if stuck and not state.degree[state.end[last]]:
+            way += UNCLOSED_COST
+    return way
 
 
 def _arms(state: StreetState, bits: dict[int, int]) -> dict[int, list[Arm]]:

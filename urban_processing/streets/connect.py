@@ -10,12 +10,8 @@ import numpy as np
 from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.streets.blocks import layout_cost
 from urban_processing.streets.ends import close_end
-from urban_processing.streets.paths import find_paths, join_cost
+from urban_processing.streets.paths import UNCLOSED_COST, find_paths, join_cost
 from urban_processing.streets.state import StreetState
-
-UNCLOSED_COST = 10.0
-"""Cost in parcel sides of an end that cannot be led on though dead ends are not wanted."""
-
 
 def lay_access(
     state: StreetState, chains: Sequence[int], *, keep_ends: bool, bound: float = math.inf

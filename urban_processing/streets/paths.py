@@ -17,6 +17,9 @@ JOG_COST = 0.5
 JOG_DISTANCE = 0.6
 """Distance of junctions in parcel sides below which streets across look like a jog."""
 
+UNCLOSED_COST = 10.0
+"""Cost in parcel sides of an end that cannot be led on though dead ends are not wanted."""
+
 SPREAD = 1.5
 EXTRA = 3.0
 """Alternative paths cost at most `SPREAD` times the best plus `EXTRA` parcel sides."""

@@ -10,7 +10,7 @@ import shapely
 from urban_processing.fields.rings import ComplexArray, cross
 from urban_processing.layout import Layout
 from urban_processing.mesh.edit import MeshEditor
-from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import Issue
 
 DIRECTIONS = 12
@@ -35,7 +35,8 @@ def cut_through_holes(layout: Layout, *, min_area: float) -> tuple[Layout, IntAr
     parent = np.arange(layout.mesh.n_faces)
     while True:
         mesh = layout.mesh
-        eligible = (mesh.face_n_loops > 1) & (mesh.face_area >= 2 * min_area) & ~layout.face_locked
+        ringed = (mesh.face_n_loops > 1) | (_slits(layout) > 0)
+        eligible = ringed & (mesh.face_area >= 2 * min_area) & ~layout.face_locked
         if not eligible.any():
             return layout, parent
         face = int(np.flatnonzero(eligible)[0])
@@ -57,6 +58,13 @@ def cut_through_holes(layout: Layout, *, min_area: float) -> tuple[Layout, IntAr
             parent = parent[source]
 
 
+def _slits(layout: Layout) -> IntArray:
+    """(F,) number of edges that have the same face on both sides."""
+    sides = layout.mesh.face.reshape(-1, 2)
+    own = sides[sides[:, 0] == sides[:, 1], 0]
+    return np.bincount(own, minlength=layout.mesh.n_faces)
+
+
 @dataclass(frozen=True)
 class _Ray:
     """A straight cut from a vertex of the hole to the boundary seen from there."""
@@ -69,46 +77,71 @@ class _Ray:
 
 
 def _cut_one(layout: Layout, face: int, min_area: float) -> tuple[Layout, IntArray] | None:
-    """Cut a face through its largest hole; None if no direction is legal."""
-    mesh = layout.mesh
-    loops = mesh.loops
-    own = np.flatnonzero((loops.face == face) & (np.arange(len(loops.face)) != mesh.face_loop[face]))
-    hole = own[np.argmax(np.abs(mesh.loop_area[own]))]
-    z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
-    vertices = mesh.origin[loops.ring(int(hole))]
-    segments = np.flatnonzero(mesh.face == face)
-    scale = float(np.sqrt(mesh.face_area[face]))
-    options = []
-    for k in range(DIRECTIONS):
-        direction = complex(np.exp(1j * np.pi * k / DIRECTIONS))
-        rays = [
-            _ray(z, vertices, segments, mesh.origin, mesh.target, d)
-            for d in (direction, -direction)
-        ]
-        if rays[0] is None or rays[1] is None or rays[0].vertex == rays[1].vertex:
+    """Cut a face through its largest hole; None if no direction is legal.
+
+    A hole gets cuts in two opposite directions. Where two holes are joined by both of theirs,
+    or one leads into the other, the face still touches itself along a slit: then a single
+    further cut is made from one of its holes.
+    """
+    scale = float(np.sqrt(layout.mesh.face_area[face]))
+    n_slits = int(_slits(layout)[face])
+    for rays in _options(layout, face, scale):
+        cut = _drawn(layout, face, rays, SNAP * scale)
+        if cut is None or not _legal(layout, cut[0], min_area):
             continue
-        cost = sum(r.length / scale + r.skew for r in rays if r is not None)
-        options.append((round(cost, 9), k, rays[0], rays[1]))
-    for _, _, ahead, back in sorted(options, key=lambda o: o[:2]):
-        cut = _drawn(layout, face, (ahead, back), SNAP * scale)
-        if cut is not None and _legal(layout, cut[0], min_area):
+        pieces = np.flatnonzero(cut[1] == face)
+        if layout.mesh.face_n_loops[face] > 1 or int(_slits(cut[0])[pieces].sum()) < n_slits:
             return cut
     return None
+
+
+def _options(layout: Layout, face: int, scale: float) -> list[tuple[_Ray, ...]]:
+    """Pairs of opposite rays from a hole, or single ones from joined holes; best first."""
+    mesh = layout.mesh
+    loops = mesh.loops
+    z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
+    segments = np.flatnonzero(mesh.face == face)
+    directions = np.exp(1j * np.pi * np.arange(2 * DIRECTIONS) / DIRECTIONS)
+    paired = mesh.face_n_loops[face] > 1
+    if paired:
+        own = np.flatnonzero(
+            (loops.face == face) & (np.arange(len(loops.face)) != mesh.face_loop[face])
+        )
+        holes = [int(own[np.argmax(np.abs(mesh.loop_area[own]))])]
+    else:
+        hole = (mesh.loop_area > 0) & (loops.face == OUTSIDE)
+        at_face = np.zeros(mesh.n_vertices, dtype=bool)
+        at_face[mesh.origin[segments]] = True
+        holes = [
+            i for i in np.flatnonzero(hole).tolist() if at_face[mesh.origin[loops.ring(i)]].any()
+        ]
+    options: list[tuple[float, int, tuple[_Ray, ...]]] = []
+    for hole_loop in holes:
+        vertices = mesh.origin[loops.ring(hole_loop)]
+        rays = [_ray(z, vertices, segments, mesh, complex(d)) for d in directions]
+        for k, ray in enumerate(rays):
+            back = rays[(k + DIRECTIONS) % len(rays)] if paired else None
+            if ray is None or (paired and (back is None or back.vertex == ray.vertex)):
+                continue
+            both = (ray,) if back is None else (ray, back)
+            cost = sum(r.length / scale + r.skew for r in both)
+            options.append((round(cost, 9), len(options), both))
+    return [rays for _, _, rays in sorted(options, key=lambda o: o[:2])]
 
 
 def _ray(
     z: ComplexArray,
     vertices: IntArray,
     segments: IntArray,
-    origin: IntArray,
-    target: IntArray,
+    mesh: PlanarMesh,
     direction: complex,
 ) -> _Ray | None:
     """Shoot from the hole's farthest vertex in a direction."""
     heights: FloatArray = (z[vertices] * np.conj(direction)).real
     vertex = int(vertices[int(np.argmax(np.round(heights, 6)))])
-    a, b = z[origin[segments]], z[target[segments]]
-    away = (origin[segments] != vertex) & (target[segments] != vertex)
+    origin, target = mesh.origin[segments], mesh.target[segments]
+    a, b = z[origin], z[target]
+    away = (origin != vertex) & (target != vertex)
     e = b - a
     ray = np.full(len(e), direction)
     denominator = cross(ray, e)
@@ -125,14 +158,14 @@ def _ray(
 
 
 def _drawn(
-    layout: Layout, face: int, rays: tuple[_Ray, _Ray], snap: float
+    layout: Layout, face: int, rays: tuple[_Ray, ...], snap: float
 ) -> tuple[Layout, IntArray] | None:
-    """Draw both cuts; the loops of the face that fall to the new side follow it."""
+    """Draw the cuts; the loops of the face that fall to the new side follow it."""
     editor = MeshEditor(layout.mesh)
     ends = []
     for ray in rays:
         ends.append(_end_vertex(editor, layout, ray, snap))
-    if ends[0] == ends[1]:
+    if len(set(ends)) < len(ends):
         return None
     for ray, end in zip(rays, ends, strict=True):
         start = _leaving_towards(editor, ray.vertex, end, face)
@@ -202,13 +235,11 @@ def _reassign_loops(editor: MeshEditor, face: int, new: int) -> None:
 def _legal(before: Layout, after: Layout, min_area: float) -> bool:
     """Whether the new faces are large enough and simple."""
     mesh = after.mesh
-    touched = np.arange(mesh.n_faces) >= before.mesh.n_faces
-    touched |= np.append(
-        mesh.face_area[: before.mesh.n_faces] != before.mesh.face_area,
-        np.zeros(mesh.n_faces - before.mesh.n_faces, dtype=bool),
-    )
-    polygons = mesh.face_polygons()[touched]
+    n_before = before.mesh.n_faces
+    touched = np.ones(mesh.n_faces, dtype=bool)
+    touched[:n_before] = mesh.face_area[:n_before] != before.mesh.face_area
     large = mesh.face_area[touched] >= min_area
-    if after.mesh.n_faces == before.mesh.n_faces:
-        return bool(large.all())  # holes were joined: the ring may touch itself for now
-    return bool(large.all() and (shapely.is_valid(polygons) | (mesh.face_n_loops[touched] > 1)).all())
+    simple = shapely.is_valid(mesh.face_polygons()[touched])
+    # while holes are being joined, a ring may touch itself along a slit
+    joined = (mesh.face_n_loops > 1) | (_slits(after) > 0)
+    return bool(large.all() and (simple | joined[touched]).all())
