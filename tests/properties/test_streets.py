@@ -23,8 +23,9 @@ from urban_processing.streets.access_rule import is_reached
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 
+
 def _quarters(outer: tuple[float, ...], inner: tuple[float, ...]) -> list[shapely.Polygon]:
-    """A box with a box-shaped hole as four polygons with shared vertices."""
+    """Divide a box with a box-shaped hole into four polygons with shared vertices."""
     o = shapely.get_coordinates(shapely.box(*outer))[:4]
     i = shapely.get_coordinates(shapely.box(*inner))[:4]
     return [shapely.Polygon([o[k], o[k - 3], i[k - 3], i[k]]) for k in range(4)]
@@ -90,7 +91,7 @@ def layouts(
     keep_ends: bool,
     rim_is_street: bool = True,
 ) -> list[Layout]:
-    """The layouts after each level of cuts and streets."""
+    """Return the layouts after each level of cuts and streets."""
     rng = np.random.default_rng(seed)
     polygons = LANDS[land]
     layout = layout_from_mesh(
@@ -119,12 +120,10 @@ def street_degree(layout: Layout) -> np.ndarray:
 
 
 def n_components(layout: Layout) -> int:
-    """Number of connected components of the streets."""
+    """Return the number of connected components of the streets."""
     mesh = layout.mesh
     ends = mesh.origin.reshape(-1, 2)[layout.edge_street]
-    links = coo_matrix(
-        (np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(mesh.n_vertices,) * 2
-    )
+    links = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(mesh.n_vertices,) * 2)
     _, label = connected_components(links, directed=False)
     return len(np.unique(label[ends]))
 
@@ -139,9 +138,7 @@ def interior_length(layout: Layout) -> float:
 @pytest.mark.parametrize("land", sorted(LANDS))
 @settings(max_examples=5, deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 10_000), preset=st.sampled_from(list(Preset)))
-def test_loops_reach_every_parcel_without_dead_ends(
-    land: str, seed: int, preset: Preset
-) -> None:
+def test_loops_reach_every_parcel_without_dead_ends(land: str, seed: int, preset: Preset) -> None:
     """All parcels reached, one component and no dead end after every level."""
     params = CogenerateParams(parcels=128, preset=preset)
     for layout in layouts(land, 7, seed, params, keep_ends=False):
@@ -185,9 +182,7 @@ def test_first_access_becomes_the_network_where_the_rim_is_no_street(
 ) -> None:
     """One component that reaches all parcels and never runs along the rim."""
     params = CogenerateParams(parcels=128)
-    layout = layouts(
-        land, 7, 3, params, keep_ends=keep_ends, rim_is_street=False
-    )[-1]
+    layout = layouts(land, 7, 3, params, keep_ends=keep_ends, rim_is_street=False)[-1]
     assert is_reached(layout.frontage, layout.mesh.face_area).all()
     assert n_components(layout) == 1
     assert not (layout.edge_street & (layout.edge_kind != EdgeKind.INTERIOR)).any()

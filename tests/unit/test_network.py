@@ -179,6 +179,26 @@ def test_a_street_never_goes_on_along_the_rim() -> None:
     assert counts(net) == (1, 1, 1)
 
 
+def test_a_street_that_prolongs_the_rim_at_a_notch_does_not_deviate_from_it() -> None:
+    layout = layout_of(boxes(2, 2, without=[(1, 0)]), [(0, 1), (1, 1)])
+    net = street_network(layout)
+    assert counts(net) == (1, 2, 0)
+    assert net.pair_deviation == pytest.approx(np.zeros(4))
+
+
+def test_the_angle_between_two_rim_streets_is_not_counted() -> None:
+    # a street out of the corner of the land, whose sides meet at 30° there
+    corner = np.array([100 * np.cos(np.radians(30)), 100 * np.sin(np.radians(30))])
+    middle = (corner + np.array([100.0, 0.0])) / 2
+    halves = [
+        shapely.Polygon([(0, 0), (100, 0), middle]),
+        shapely.Polygon([(0, 0), middle, corner]),
+    ]
+    net = street_network(layout_of(halves, [(0, 0), tuple(middle)], unit=1.0))
+    assert sorted(net.pair_deviation.tolist()) == pytest.approx([0, 0, 60, 75, 75], abs=1e-3)
+    assert sorted(net.node_deviation.tolist()) == pytest.approx([0, 75], abs=1e-3)
+
+
 def test_parts_keep_their_streets_apart() -> None:
     polygons = boxes(2, 2) + boxes(2, 2, at=(2, 2))  # they touch at a single point
     layout = layout_of(polygons, [(0, 1), (2, 1)], [(2, 3), (4, 3)], part=[0] * 4 + [1] * 4)

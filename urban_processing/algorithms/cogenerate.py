@@ -77,10 +77,10 @@ COGENERATE = AlgorithmSpec(
     run=_run,
     estimate=_estimate,
     references=(
-        "Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban "
-        "modeling. Sections 3, 4 and 6.",
-        "Yang, Y.-L. et al. (2013). Urban pattern: layout design by hierarchical domain "
-        "splitting. Section 5.",
+        "Z. Chen, P. Song and F. P. Ortner (2024). Hierarchical co-generation of parcels and "
+        "streets in urban modeling. Computer Graphics Forum 43(2). Sections 3, 4 and 6.",
+        "Y.-L. Yang, J. Wang, E. Vouga and P. Wonka (2013). Urban pattern: layout design by "
+        "hierarchical domain splitting. ACM Transactions on Graphics 32(6). Section 5.",
     ),
     examples=(
         "sample_data/wandsworth.gpkg -o layout.gpkg --parcels 500 --plot layout.png",

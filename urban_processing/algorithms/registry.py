@@ -34,6 +34,4 @@ def get(name: str) -> AlgorithmSpec:
         return known[name]
     close = difflib.get_close_matches(name, known, n=1)
     hint = f" Did you mean {close[0]}?" if close else ""
-    raise ParameterError(
-        f"There is no algorithm {name!r}.{hint} There are: {', '.join(known)}."
-    )
+    raise ParameterError(f"There is no algorithm {name!r}.{hint} There are: {', '.join(known)}.")

@@ -14,6 +14,9 @@ from typing import Any, Protocol
 from urban_processing.params.base import ParamField, Params
 from urban_processing.progress import Progress
 
+MANY_PARCELS = 20_000
+"""Shells warn before a run that makes more parcels than this."""
+
 
 class InputKind(enum.StrEnum):
     """What an algorithm reads; a shell knows how to ask for each kind."""
@@ -156,12 +159,14 @@ class AlgorithmSpec:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")
 
     def panels(self) -> dict[str, tuple[ParamField, ...]]:
-        """Return the parameters by panel, as shells show them; the advanced ones come last."""
-        panels: dict[str, list[ParamField]] = {}
-        for field in self.params.fields():
-            if not field.param.advanced:
-                panels.setdefault(field.param.group or "General", []).append(field)
-        advanced = [field for field in self.params.fields() if field.param.advanced]
-        if advanced:
-            panels["Advanced"] = advanced
-        return {panel: tuple(fields) for panel, fields in panels.items()}
+        """Return the parameters by panel, as shells show them.
+
+        Those without a group come after the groups, the advanced ones last.
+        """
+        fields = self.params.fields()
+        plain = [field for field in fields if not field.param.advanced]
+        named = dict.fromkeys(field.param.group for field in plain if field.param.group)
+        panels = {group: [f for f in plain if f.param.group == group] for group in named}
+        panels["General"] = [field for field in plain if not field.param.group]
+        panels["Advanced"] = [field for field in fields if field.param.advanced]
+        return {panel: tuple(members) for panel, members in panels.items() if members}

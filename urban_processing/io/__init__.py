@@ -1,0 +1,1 @@
+"""The outside world: boundaries, CRSs, files, frames and places by name."""

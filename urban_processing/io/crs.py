@@ -212,7 +212,9 @@ def _utm_zone(lon: float, lat: float) -> pyproj.CRS | None:
 
 def _cell_area(crs: pyproj.CRS, lat: FloatArray, step: float) -> FloatArray:
     """Area in m² of a cell of `step` by `step` radians on the ellipsoid of a CRS."""
-    ellipsoid = crs.ellipsoid
+    ellipsoid = crs.ellipsoid or WGS84.ellipsoid
+    if ellipsoid is None:
+        raise BoundaryError(f"The CRS {crs.name} has no ellipsoid: choose another with crs (--crs).")
     a, b = ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre
     e2 = 1.0 - (b / a) ** 2
     w2 = 1.0 - e2 * np.sin(lat) ** 2
@@ -228,4 +230,4 @@ def _local_centre(crs: pyproj.CRS) -> tuple[float, float] | None:
     names = "Longitude of natural origin", "Latitude of natural origin"
     if not all(name in values for name in names):
         return None
-    return values[names[0]], values[names[1]]
+    return float(values[names[0]]), float(values[names[1]])

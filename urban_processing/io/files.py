@@ -73,10 +73,7 @@ def write_layout(
     problems = check_output(target, overwrite=overwrite)
     if problems:
         raise OutputError(problems)
-    if not record_seconds:
-        timeless = [dataclasses.replace(step, seconds=math.nan) for step in layout.history]
-        layout = layout.replace(history=tuple(timeless))
-    layout = canonical(layout)
+    layout = canonical(layout if record_seconds else timeless(layout))
     with _replacing(target) as temporary:
         write_geopackage(
             temporary, layout_tables(layout), crs=layout.frame.crs, state=_state(layout)
@@ -109,6 +106,12 @@ def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[
             "there, or choose another name."
         )
     return problems
+
+
+def timeless(layout: Layout) -> Layout:
+    """Return the layout without how long its steps took, which no two runs share."""
+    steps = [dataclasses.replace(step, seconds=math.nan) for step in layout.history]
+    return layout.replace(history=tuple(steps))
 
 
 def folder_problems(folder: Path) -> list[str]:
@@ -163,13 +166,13 @@ def _replacing(target: Path) -> Iterator[Path]:
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
             temporary = Path(folder) / target.name
             yield temporary
-            os.replace(temporary, target)
+            temporary.replace(target)
     except (DataSourceError, DataLayerError, FeatureError, FieldError, OSError) as error:
         raise OutputError(f"{target} cannot be written: {error}") from error
 
 
 def _state(layout: Layout) -> str:
-    """What the layers do not say about a layout, as JSON."""
+    """Return what the layers do not say about a layout, as JSON."""
     return json.dumps(
         {
             "format": FILE_FORMAT,

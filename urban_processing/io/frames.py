@@ -107,7 +107,8 @@ class GeoLayout:
         of_part = np.isnan(table["part"]) if part is None else table["part"] == part
         found = np.flatnonzero(of_part & (table["metric"] == name))
         if not len(found):
-            raise KeyError(f"There is no metric {name!r}" + ("" if part is None else f" of part {part}"))
+            scope = "" if part is None else f" of part {part}"
+            raise KeyError(f"There is no metric {name!r}{scope}.")
         return float(table["value"][found[0]])
 
     def plot(
@@ -164,5 +165,6 @@ def table_frame(name: str, table: Table | None, *, crs: str) -> gpd.GeoDataFrame
             columns[column.name] = np.asarray(values, dtype=column.dtype.value)
     if declared.geometry is GeometryType.NONE:
         return pd.DataFrame(columns)
-    geometry = [] if table is None or table.geometry is None else table.geometry
+    empty = table is None or table.geometry is None
+    geometry = np.empty(0, dtype=object) if empty else table.geometry
     return gpd.GeoDataFrame(columns, geometry=gpd.GeoSeries(geometry, crs=crs or None))

@@ -79,7 +79,7 @@ def rebuild_layout(
     TopologyError
         If parcels overlap, or a street segment is no edge of a parcel.
     """
-    mesh = mesh_from_polygons(canonical_rings(parts.polygons))
+    mesh = mesh_from_polygons(list(canonical_rings(parts.polygons)))
     level = _edge_levels(mesh, parts.segments, parts.segment_level)
     return Layout(
         mesh=mesh,

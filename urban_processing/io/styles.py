@@ -50,7 +50,7 @@ def layer_style(name: str, *, aliases: Mapping[str, str]) -> str | None:
 
 
 def _renderer(rules: Sequence[_Rule], *, symbol_levels: bool) -> ET.Element:
-    """A rule-based renderer; with symbol levels all casings lie below all fills."""
+    """Draw by rules; with symbol levels all casings lie below all fills."""
     renderer = ET.Element(
         "renderer-v2",
         type="RuleRenderer",
@@ -79,7 +79,7 @@ def _renderer(rules: Sequence[_Rule], *, symbol_levels: bool) -> ET.Element:
 
 
 def _layer(
-    kind: str, options: Mapping[str, str], *, level: int = 0, data_defined: Mapping[str, str] = {}
+    kind: str, options: Mapping[str, str], *, level: int = 0, data_defined: Mapping[str, str] | None = None
 ) -> ET.Element:
     """One symbol layer; `data_defined` gives expressions for properties."""
     layer = ET.Element(
@@ -122,7 +122,7 @@ def _fill(
 
 
 def _line(color: str, *, factor: float, at_least: float, level: int) -> ET.Element:
-    """A line as wide as the street, and no thinner on the map than `at_least` mm."""
+    """Draw a line as wide as the street, no thinner on the map than `at_least` mm."""
     return _layer(
         "SimpleLine",
         {
@@ -140,8 +140,8 @@ def _line(color: str, *, factor: float, at_least: float, level: int) -> ET.Eleme
 
 
 def _street(factor: float) -> list[ET.Element]:
-    casing = _line(_CASING, factor=1.4 * factor, at_least=0.62, level=0)
-    return [casing, _line(_STREET, factor=factor, at_least=0.36, level=1)]
+    casing = _line(_CASING, factor=1.4 * factor, at_least=0.85, level=0)
+    return [casing, _line(_STREET, factor=factor, at_least=0.5, level=1)]
 
 
 def _marker(
@@ -199,7 +199,7 @@ def _streets() -> list[_Rule]:
 
 def _junctions() -> list[_Rule]:
     small = _marker("circle", "255,255,255,255", metres=4, at_least=0.35)
-    end = _marker("circle", _STREET, metres=14, at_least=0.9)
+    end = _marker("circle", _STREET, metres=14, at_least=1.3)
     entry = _marker("triangle", "255,255,255,255", metres=14, at_least=1.4)
     return [
         _Rule("Junction", "\"kind\" = 'junction'", [small], "marker"),

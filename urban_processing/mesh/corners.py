@@ -7,7 +7,6 @@ after the other (not closed), ring ``i`` being ``xy[offsets[i]:offsets[i + 1]]``
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
@@ -133,7 +132,10 @@ def _first_equal(values: FloatArray, wanted: FloatArray, offsets: IntArray) -> B
 
 
 def simplified_vertices(xy: FloatArray, offsets: IntArray, share: float) -> IntArray:
-    """Indices of the vertices that Douglas–Peucker keeps, at least three for each ring."""
+    """Sorted indices of the vertices that Douglas–Peucker keeps, at least three for each ring.
+
+    The tolerance is `share` of √area; each ring is simplified from its sharpest vertex.
+    """
     tolerance = share * np.sqrt(np.abs(ring_areas(xy, offsets)))
     start = sharpest_vertex(xy, offsets)
     count = np.diff(offsets)
@@ -144,30 +146,15 @@ def simplified_vertices(xy: FloatArray, offsets: IntArray, share: float) -> IntA
     turned = np.repeat(start - offsets[:-1], count + 1) + step
     index = np.repeat(offsets[:-1], count + 1) + turned % np.repeat(count, count + 1)
     ring = np.repeat(np.arange(len(count)), count + 1)
-    lines = shapely.linestrings(xy[index], indices=ring)
+    # each point carries its index as height, so that those that are left can be told
+    lines = shapely.linestrings(np.column_stack([xy[index], index]), indices=ring)
     simple = shapely.simplify(lines, tolerance, preserve_topology=False)
-    kept = _match(xy[index], ring, simple)
-    kept[np.append(np.diff(ring) > 0, True)] = False  # the closing point
-    few = np.flatnonzero(np.bincount(ring[kept], minlength=len(count)) < 3)
     mask = np.zeros(len(xy), dtype=bool)
-    mask[index[kept]] = True
+    mask[shapely.get_coordinates(simple, include_z=True)[:, 2].astype(np.int64)] = True
+    few = np.flatnonzero(np.add.reduceat(mask, offsets[:-1], dtype=np.int64) < 3)
     for i in few:
         mask[offsets[i] : offsets[i + 1]] |= _three_corners(xy[offsets[i] : offsets[i + 1]])
     return np.flatnonzero(mask)
-
-
-def _match(xy: FloatArray, ring: IntArray, simple: npt.NDArray[np.object_]) -> BoolArray:
-    """Which points of the lines are left: simplified points appear in the same order."""
-    left, left_ring = shapely.get_coordinates(simple, return_index=True)
-    kept = np.zeros(len(xy), dtype=bool)
-    cursor = 0
-    points, rings = xy.tolist(), ring.tolist()
-    for point, r in zip(left.tolist(), left_ring.tolist(), strict=True):
-        while rings[cursor] != r or points[cursor] != point:
-            cursor += 1
-        kept[cursor] = True
-        cursor += 1
-    return kept
 
 
 def _three_corners(xy: FloatArray) -> BoolArray:

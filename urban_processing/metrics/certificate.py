@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,6 @@ from urban_processing.metrics.tables import (
     Table,
     boundary_table,
     issue_table,
-    parcel_table,
     street_table,
 )
 
@@ -80,13 +79,18 @@ def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None
         Polygon of each part in local coordinates, such as ``site.parts`` after
         simplification; by default the rims of the layout itself.
     """
+    # the geometries of `parcel_table`, without its measures, which nobody asks for here
+    parcels = Table(
+        {"parcel_id": np.arange(1, layout.mesh.n_faces + 1), "part": layout.face_part},
+        layout.mesh.face_polygons(layout.frame.origin),
+    )
     boundary = boundary_table(layout)
     if land is not None:
         origin = np.asarray(layout.frame.origin)
         moved = shapely.transform(np.array(land, dtype=object), lambda xy: xy + origin)
         boundary = Table({"part": np.arange(len(land)), "area_m2": shapely.area(moved)}, moved)
     return certify(
-        parcel_table(layout),
+        parcels,
         street_table(layout),
         boundary,
         min_area=layout.min_area,
@@ -128,11 +132,14 @@ def certify(
     polygons, lines, land = _shift_to_origin(_geometry(parcels), streets, boundary)
     usable = _usable(polygons)
     land_part = np.asarray(boundary["part"], dtype=np.int64)
+    coverage = _coverage(ids[usable], polygons[usable])
+    # uniting a valid coverage is faster, and only right, where its boundaries match
+    unite = shapely.coverage_union_all if coverage.holds else shapely.union_all
     return Certificate(
         (
             _valid(ids, usable),
-            _coverage(ids[usable], polygons[usable]),
-            _land_covered(polygons[usable], part[usable], land, land_part),
+            coverage,
+            _land_covered(polygons[usable], part[usable], land, land_part, unite),
             *_street_checks(ids, polygons, lines, usable),
             _connected(lines, np.asarray(streets["part"], dtype=np.int64), land_part, ids, part),
             _large_enough(ids, part, polygons, min_area, issues),
@@ -183,12 +190,13 @@ def _land_covered(
     part: IntArray,
     land: npt.NDArray[np.object_],
     land_part: IntArray,
+    unite: Callable[[npt.NDArray[np.object_]], shapely.Geometry],
 ) -> Check:
     """Gaps and overhangs, and overlaps, which the union alone would hide."""
     difference = 0.0
     for p in np.union1d(part, land_part).tolist():
         own = polygons[part == p]
-        union = shapely.union_all(own)
+        union = unite(own)
         whole = shapely.union_all(land[land_part == p])
         difference += shapely.area(shapely.symmetric_difference(union, whole))
         difference += abs(float(shapely.area(own).sum()) - shapely.area(union))

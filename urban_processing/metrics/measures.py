@@ -185,7 +185,9 @@ def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -
     mesh = layout.mesh
     street = ~net.street_rim & _in_part(net.street_part, part)
     node = net.node_interior & _in_part(net.node_part, part)
-    deviation = net.pair_deviation[node[net.pair_node]]
+    here = node[net.pair_node]
+    deviation = net.pair_deviation[here & (net.pair_rim < 2)]
+    deviation_interior = net.pair_deviation[here & (net.pair_rim == 0)]
     n_streets, n_parcels = int(street.sum()), int(inside.sum())
     length = float(net.street_length[street].sum())
     interior = (layout.edge_kind == EdgeKind.INTERIOR) & _edges_of(layout, inside)
@@ -199,6 +201,7 @@ def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -
         "street_length_m": length,
         "street_length_mean_m": length / n_streets if n_streets else math.nan,
         "junction_deviation_deg": _mean(deviation),
+        "junction_deviation_deg" + INTERIOR: _mean(deviation_interior),
         "junction_deviation_max_deg": _highest(deviation),
         "street_share_pct": (
             100.0 * interior_street / interior_length if interior_length else math.nan

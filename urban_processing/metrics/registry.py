@@ -69,7 +69,14 @@ METRICS: tuple[MetricSpec, ...] = (
         "junction_deviation_deg",
         "°",
         _CHEN,
-        "Mean over all pairs of streets at junctions of 90° less the acute angle between them.",
+        "Mean over all pairs of streets at junctions, not both of the rim, of 90° less the acute "
+        "angle between them.",
+    ),
+    MetricSpec(
+        "junction_deviation_deg" + INTERIOR,
+        "°",
+        "",
+        "The same over pairs of streets that are both interior.",
     ),
     MetricSpec(
         "junction_deviation_max_deg", "°", "", "Largest deviation from 90° of a pair of streets."

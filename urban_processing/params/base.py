@@ -71,9 +71,7 @@ class Params:
     def fields(cls) -> tuple[ParamField, ...]:
         """Return the declared parameters in order."""
         hints = typing.get_type_hints(cls, include_extras=True)
-        return tuple(
-            _field(f.name, hints[f.name], f.default) for f in dataclasses.fields(cls)
-        )
+        return tuple(_field(f.name, hints[f.name], f.default) for f in dataclasses.fields(cls))
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> Self:

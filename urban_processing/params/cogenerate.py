@@ -231,6 +231,9 @@ class Rules:
         Default weight of continuing a neighbour's cut (Yang 2013, section 5).
     clearance
         Penalty on cuts that run close to the boundary: they leave slivers at notches.
+    prospect
+        Weight of the parcels that later cuts can make of a half, in rating its proportions;
+        0 rates the half's own proportions.
     aligned_seeds
         Also seed at the centroid, beside reflex corners and where neighbours' cuts end.
     snap
@@ -245,6 +248,7 @@ class Rules:
     size_cap: float
     continuity: float
     clearance: float
+    prospect: float
     aligned_seeds: bool
     snap: float
     look_ahead: int
@@ -257,6 +261,7 @@ RULES: dict[Preset, Rules] = {
         size_cap=0.7,
         continuity=0.05,
         clearance=0.4,
+        prospect=6.0,
         aligned_seeds=True,
         snap=0.08,
         look_ahead=6,
@@ -267,6 +272,7 @@ RULES: dict[Preset, Rules] = {
         size_cap=1.0,
         continuity=0.0,
         clearance=0.0,
+        prospect=0.0,
         aligned_seeds=False,
         snap=0.0,
         look_ahead=1,

@@ -6,7 +6,6 @@ import heapq
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.streets.paths import UNCLOSED_COST
 from urban_processing.streets.state import FAR, StreetState
 

@@ -32,7 +32,7 @@ def layout_cost(state: StreetState, chains: Sequence[int]) -> float:
 
 
 def small_block_deficit(state: StreetState, chains: Sequence[int]) -> int:
-    """Number of parcels that the blocks beside `chains` have less than `SMALL_BLOCK`."""
+    """Count the parcels that the blocks beside `chains` have less than `SMALL_BLOCK`."""
     deficit = 0
     face, around, street = state.face, state.around, state.street
     done: set[int] = set()

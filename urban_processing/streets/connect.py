@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from urban_processing.streets.blocks import layout_cost
 from urban_processing.streets.ends import close_end
 from urban_processing.streets.paths import UNCLOSED_COST, find_paths, join_cost
 from urban_processing.streets.state import StreetState
+
 
 def lay_access(
     state: StreetState, chains: Sequence[int], *, keep_ends: bool, bound: float = math.inf
@@ -75,7 +77,7 @@ def _add(state: StreetState, way: tuple[float, list[int]]) -> float:
 def _cost_of(state: StreetState, chains: Sequence[int]) -> float:
     """Length and turns of an access, and the junctions of its ends that lie on streets."""
     cost = sum(state.size[i] for i in chains)
-    for before, after in zip(chains, chains[1:], strict=False):
+    for before, after in pairwise(chains):
         if after not in state.ahead[before]:
             cost += state.turn_cost
     for last in (chains[-1], chains[0] ^ 1):
@@ -113,7 +115,7 @@ def path_to_network(
 def join_components(state: StreetState) -> None:
     """Connect the street components of each part, as far as there is a way."""
     n_components, label = state.network_components()
-    parts = {}
+    parts: dict[int, int] = {}
     for node in np.flatnonzero(label >= 0).tolist():
         parts.setdefault(int(label[node]), _part_of(state, node))
     if n_components == len(set(parts.values())):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-
 from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams
-from urban_processing.streets.access import MISSED, Access, find_accesses
-from urban_processing.streets.connect import join_components, lay_access
+from urban_processing.streets.connect import join_components
 from urban_processing.streets.ends import close_ends, prune_tails, retract_ends
 from urban_processing.streets.groups import group_parcels, unreached_parcels
+from urban_processing.streets.reach import reach_group
 from urban_processing.streets.split import split_blocks
 from urban_processing.streets.state import StreetState
+
+ROUNDS = 3
+"""Times that dead ends which cannot be led on are taken back and their parcels reached anew."""
 
 
 def extend_streets(
@@ -47,15 +47,17 @@ def extend_streets(
         The same parcels with more street edges.
     """
     state = StreetState(layout, params)
-    if not keep_ends:
-        # what was left open on a coarser level, and what merging vertices cut off
-        close_ends(state)
-        retract_ends(state)
-    unreached = unreached_parcels(state)
-    if unreached:
+    for _ in range(ROUNDS):
+        if not keep_ends:
+            # ends left open on a coarser level, cut off by merged vertices, or by this round
+            close_ends(state)
+            retract_ends(state)
+        unreached = unreached_parcels(state)
+        if not unreached:
+            break
         distance = state.network_distance()
         for group in group_parcels(state, unreached):
-            _reach(state, group, distance, keep_ends=keep_ends)
+            reach_group(state, group, distance, keep_ends=keep_ends)
     prune_tails(state)
     join_components(state)
     if not keep_ends:
@@ -63,38 +65,3 @@ def extend_streets(
         if state.rules.small_block:
             split_blocks(state)
     return state.finish(level=level)
-
-
-def _reach(
-    state: StreetState, group: Sequence[int], distance: Sequence[float], *, keep_ends: bool
-) -> None:
-    """Lay accesses until all parcels of a group are reached, or no access can be laid."""
-    while True:
-        group = [f for f in group if not state.is_reached(f)]
-        if not group:
-            return
-        accesses = find_accesses(state, group, distance, keep_ends=keep_ends)
-        streets = _cheapest(state, group, accesses, keep_ends=keep_ends)
-        if not streets:
-            return
-        for i in streets:
-            state.add(i)
-        state.part_has_streets[state.part[group[0]]] = True
-
-
-def _cheapest(
-    state: StreetState, group: Sequence[int], accesses: list[Access], *, keep_ends: bool
-) -> list[int]:
-    """Chains that the best access adds with its connection; simulated and taken back."""
-    best: list[int] = []
-    best_cost = math.inf
-    for access in accesses:
-        mark = len(state.journal)
-        cost = lay_access(state, access.chains, keep_ends=keep_ends, bound=best_cost)
-        if cost < best_cost:
-            cost += MISSED * sum(not state.is_reached(f) for f in group)
-        if cost < best_cost:
-            best_cost = cost
-            best = state.journal[mark:]
-        state.undo(mark)
-    return best

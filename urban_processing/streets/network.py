@@ -84,7 +84,9 @@ class StreetNetwork:
     edge_street
         (K,) street that a network edge belongs to. At a node the straightest pair of edges
         continues as one street, then the straightest of the rest, while the included angle
-        is above `STRAIGHT_DEG`; rim and interior edges never pair.
+        is above `STRAIGHT_DEG`. Where an interior street goes straight on into the rim, as
+        at a notch, the two are one continuation but keep separate numbers, since streets are
+        counted without the rim.
     node_vertex, node_part, node_degree
         (N,) mesh vertex, part and number of street edges of a node.
     node_kind
@@ -154,10 +156,20 @@ class StreetNetwork:
         return np.where(counted, np.cumsum(counted), 0)
 
     @cached_property
+    def pair_rim(self) -> IntArray:
+        """(P,) how many of the two edges of a pair lie on the rim.
+
+        Two rim streets meet as the land makes them: their angle is not counted.
+        """
+        return np.asarray(self.edge_rim[self.pair_edges].sum(axis=1))
+
+    @cached_property
     def node_deviation(self) -> FloatArray:
-        """(N,) mean junction deviation in degrees; NaN where no streets meet."""
-        n = np.bincount(self.pair_node, minlength=self.n_nodes)
-        total = np.bincount(self.pair_node, weights=self.pair_deviation, minlength=self.n_nodes)
+        """(N,) mean deviation in degrees of the pairs that are not both rim; NaN without any."""
+        counted = self.pair_rim < 2
+        node, deviation = self.pair_node[counted], self.pair_deviation[counted]
+        n = np.bincount(node, minlength=self.n_nodes)
+        total = np.bincount(node, weights=deviation, minlength=self.n_nodes)
         return np.where(n > 0, total / np.maximum(n, 1), np.nan)
 
     @cached_property
@@ -207,10 +219,11 @@ def street_network(layout: Layout) -> StreetNetwork:
     kind[start[alone]] = NodeKind.POINT
     level = np.asarray(layout.edge_level[half_edges >> 1], dtype=np.int64)
     edge_level = np.minimum.reduceat(level, offsets[:-1]) if n_edges else level
-    pair_node, pair_arms, continues = _pair_arms(mesh, first, last, ends, kind, edge_rim)
+    pair_node, pair_arms, continues = _pair_arms(mesh, first, last, ends, kind)
     chord = _chords(mesh, half_edges, offsets, start == end)
     pair_edges = pair_arms % max(n_edges, 1)
     meet = ~continues
+    same = continues & (edge_rim[pair_edges[:, 0]] == edge_rim[pair_edges[:, 1]])
     angle = _included(chord[pair_arms[meet, 0]], chord[pair_arms[meet, 1]])
     return StreetNetwork(
         half_edges=half_edges,
@@ -222,7 +235,7 @@ def street_network(layout: Layout) -> StreetNetwork:
         edge_level=edge_level,
         edge_length=_lengths(mesh, half_edges, offsets),
         edge_class=_classes(start, end, kind, degree, edge_rim, edge_level),
-        edge_street=_components(n_edges, pair_edges[continues]),
+        edge_street=_components(n_edges, pair_edges[same]),
         node_vertex=node_vertex,
         node_part=node_part,
         node_degree=degree,
@@ -294,7 +307,6 @@ def _pair_arms(
     last: IntArray,
     arm_node: IntArray,
     node_kind: IntArray,
-    edge_rim: BoolArray,
 ) -> tuple[IntArray, IntArray, BoolArray]:
     """All pairs of arms at junctions, and which of them continue as one street.
 
@@ -309,8 +321,7 @@ def _pair_arms(
     pairs = np.column_stack([arms[i], arms[j]])
     direction = _directions(mesh)[np.concatenate([first, last ^ 1])]
     included = np.round(_included(direction[pairs[:, 0]], direction[pairs[:, 1]]), 6)
-    rim = np.tile(edge_rim, 2)[pairs]
-    straight = np.flatnonzero((included > STRAIGHT_DEG) & (rim[:, 0] == rim[:, 1]))
+    straight = np.flatnonzero(included > STRAIGHT_DEG)
     straight = straight[np.lexsort((straight, -included[straight]))]
     continues = np.zeros(len(pairs), dtype=bool)
     taken = np.zeros(len(arm_node), dtype=bool)

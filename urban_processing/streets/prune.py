@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams
-from urban_processing.streets.blocks import LARGEST_BLOCK, layout_cost
+from urban_processing.streets.blocks import LARGEST_BLOCK
 from urban_processing.streets.ends import close_ends, is_spare, prune_tails
-from urban_processing.streets.paths import JOIN_COST
+from urban_processing.streets.links import link_cost, stands_free, street_links
 from urban_processing.streets.state import StreetState
 
 
@@ -53,7 +53,7 @@ def prune_links(state: StreetState) -> None:
         return b
 
     while True:
-        links = sorted(((-_gain(state, link), link) for link in street_links(state)))
+        links = sorted((-link_cost(state, link), link) for link in street_links(state))
         removed = False
         for loss, link in links:
             if loss >= 0.0:
@@ -62,7 +62,7 @@ def prune_links(state: StreetState) -> None:
             b = block_of(state.face[link[0] ^ 1])
             if a == b or members[a] + members[b] > LARGEST_BLOCK:
                 continue
-            if not _stands_free(state, link) or not is_spare(state, link):
+            if not stands_free(state, link) or not is_spare(state, link):
                 continue
             for i in link:
                 state.remove(i)
@@ -71,46 +71,3 @@ def prune_links(state: StreetState) -> None:
             removed = True
         if not removed:
             return
-
-
-def street_links(state: StreetState) -> list[list[int]]:
-    """Interior streets from junction to junction, each in one direction."""
-    degree, street, end = state.degree, state.street, state.end
-    links = []
-    for first in range(len(street)):
-        if not street[first] or degree[state.start[first]] < 3:
-            continue
-        link = [first]
-        while degree[end[link[-1]]] == 2:
-            back = link[-1] ^ 1
-            link.append(next(i for i in state.out[end[back ^ 1]] if street[i] and i != back))
-        if (
-            degree[end[link[-1]]] >= 3
-            and first < link[-1] ^ 1
-            and all(state.interior[i] for i in link)
-        ):
-            links.append(link)
-    return links
-
-
-def _stands_free(state: StreetState, link: list[int]) -> bool:
-    """Whether a link is all street still, and both its ends are junctions."""
-    a, b = state.start[link[0]], state.end[link[-1]]
-    enough = 4 if a == b else 3
-    return (
-        state.degree[a] >= enough
-        and state.degree[b] >= enough
-        and all(state.street[i] for i in link)
-    )
-
-
-def _gain(state: StreetState, link: list[int]) -> float:
-    """Cost that the network loses with a link."""
-    gain = sum(state.size[i] for i in link) + layout_cost(state, link)
-    for before, after in zip(link, link[1:], strict=False):
-        if after not in state.ahead[before]:
-            gain += state.turn_cost
-    for last in (link[-1], link[0] ^ 1):
-        goes_on = any(state.street[i] for i in state.ahead[last])
-        gain += (-JOIN_COST if goes_on else JOIN_COST) * state.turn_cost
-    return gain

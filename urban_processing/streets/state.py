@@ -54,9 +54,7 @@ class StreetState:
         self.around = _ragged(graph.around, graph.around_offsets)
         self.ahead, self.aside, self.follow = _successors(graph, usable)
         streets = np.flatnonzero(layout.chain_street)
-        self.degree: list[int] = np.bincount(
-            graph.start[streets], minlength=graph.n_nodes
-        ).tolist()
+        self.degree: list[int] = np.bincount(graph.start[streets], minlength=graph.n_nodes).tolist()
         self.frontage: list[float] = layout.frontage.tolist()
         self.need: list[float] = _needs(layout, usable).tolist()
         self.part: list[int] = layout.face_part.tolist()
@@ -121,10 +119,11 @@ class StreetState:
             (weights, (graph.start[ok], graph.end[ok])), shape=(graph.n_nodes, graph.n_nodes)
         )
         distance = dijkstra(links.tocsr(), indices=sources, min_only=True)
-        return np.where(np.isfinite(distance), distance, FAR).tolist()
+        near: list[float] = np.where(np.isfinite(distance), distance, FAR).tolist()
+        return near
 
     def network_components(self) -> tuple[int, IntArray]:
-        """Number of connected components of the streets, and the component of each node.
+        """Return the number of components of the streets and (N,) the component of each node.
 
         Nodes without a street get -1.
         """
@@ -219,5 +218,4 @@ def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
     need = np.minimum(
         required_frontage(layout.mesh.face_area) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
     )
-    need[layout.face_locked] = 0.0
-    return need
+    return np.where(layout.face_locked, 0.0, need)

@@ -11,6 +11,7 @@ from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS, STRAIGHT_ANGLE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.subdivision.cuts import CLEARANCE, Cuts
+from urban_processing.subdivision.prospect import prospect_of_area, prospect_of_quota
 from urban_processing.subdivision.parcels import CONTINUES_ANGLE, Boundary
 
 ALTERNATIVES = 4
@@ -23,6 +24,10 @@ better one is kept."""
 
 QUOTA_WEIGHT = 2.0
 """Weight, relative to λ1, of parcels of equal size where their number is given."""
+
+
+OWN_SHARE = 0.2
+"""Weight of the present proportions of a half that is still to be cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,46 +75,61 @@ def score_cuts(
     ring_part = boundary.twice_area_between(cuts.parcel, t_b, t_a)
     area = 0.5 * (cuts.bulge + cross(a, b) + ring_part)
     smaller, larger = np.minimum(area, 1.0 - area), np.maximum(area, 1.0 - area)
-    left, left_side, left_n = _half(boundary, cuts.parcel, a, b, t_a, t_b)
-    right, right_side, right_n = _half(boundary, cuts.parcel, b, a, t_b, t_a)
+    left = _half(boundary, cuts.parcel, a, b, t_a, t_b)
+    right = _half(boundary, cuts.parcel, b, a, t_b, t_a)
     street = np.column_stack(
         [
             boundary.street_between(cuts.parcel, t_b, t_a),
             boundary.street_between(cuts.parcel, t_a, t_b),
         ]
     )
-    reached = street >= params.access_ratio * np.column_stack([left_side, right_side])
+    reached = street >= params.access_ratio * np.column_stack([left.mean_side, right.mean_side])
     w_size, w_shape, w_access = params.weights
+    parcel_quota = quota[cuts.parcel]
+    shape = [left.irregularity, right.irregularity]
+    if rules.prospect > 0:
+        left_quota = _left_quota(area, parcel_quota)
+        total = area / min_share[cuts.parcel], (1.0 - area) / min_share[cuts.parcel]
+        shape = [
+            left.with_prospect(total[0], left_quota, rules.prospect),
+            right.with_prospect(total[1], parcel_quota - left_quota, rules.prospect),
+        ]
     quality = (
         w_size * np.minimum(1.0, smaller / larger / rules.size_cap)
-        + w_shape / (1.0 + left + right)
+        + w_shape / (1.0 + shape[0] + shape[1])
         + w_access * (1.0 + reached.all(axis=1))
         - rules.clearance * np.clip(1.0 - cuts.clearance / CLEARANCE, 0.0, 1.0)
     )
-    quality -= w_size * np.minimum(1.0, QUOTA_WEIGHT * _quota_misfit(area, quota[cuts.parcel]))
+    quality -= w_size * np.minimum(1.0, QUOTA_WEIGHT * _quota_misfit(area, parcel_quota))
     if params.continuity > 0:
         ends = _continues(boundary, cuts.parcel, node_a, cuts.leaving).astype(np.float64)
         ends += _continues(boundary, cuts.parcel, node_b, -cuts.arriving)
         quality += params.continuity * 0.5 * ends
     if params.orientation is not None:
         quality += params.weight_orientation * _oriented(boundary, cuts.parcel, b - a, params.orientation)
-    legal = (smaller >= min_share[cuts.parcel]) & (left_n >= 3) & (right_n >= 3)
+    legal = (smaller >= min_share[cuts.parcel]) & (left.n >= 3) & (right.n >= 3)
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
     return ScoredCuts(
-        cuts, t_a, t_b, area, np.column_stack([left, right]), reached, quality
+        cuts, t_a, t_b, area, np.column_stack([left.irregularity, right.irregularity]), reached, quality
     )
 
 
 def _quota_misfit(area: FloatArray, quota: IntArray) -> FloatArray:
     """How far the mean parcel of either half would be from the parcel's own mean, as a share."""
     n = np.maximum(quota, 2)
-    left = np.clip(np.round(n * area), 1, n - 1)
-    with np.errstate(divide="ignore"):
+    left = _left_quota(area, n)
+    with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.stack([area * n / left, (1.0 - area) * n / (n - left)])
         worst = np.maximum(ratios, 1.0 / ratios).max(axis=0) - 1.0
     return np.asarray(np.where(quota >= 2, worst, 0.0))
+
+
+def _left_quota(area: FloatArray, quota: IntArray) -> IntArray:
+    """Number of parcels that the left half is to become, of `quota`; 0 where there is none."""
+    left = np.clip(np.round(quota * area), 1, np.maximum(quota - 1, 1))
+    return np.asarray(np.where(quota > 0, left, 0), dtype=np.int64)
 
 
 def _snapped(
@@ -151,6 +171,36 @@ def _oriented(
     return np.asarray(1.0 - 2.0 / np.pi * np.arccos(np.clip(np.abs(along), 0.0, 1.0)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Half:
+    """Approximate polygons of one half of each candidate.
+
+    `aspect` is the mean of two opposite sides over that of the other two; 0 where the polygon
+    is no quadrilateral.
+    """
+
+    irregularity: FloatArray
+    by_angle: FloatArray
+    mean_side: FloatArray
+    n: IntArray
+    aspect: FloatArray
+
+    def with_prospect(self, content: FloatArray, quota: IntArray, weight: float) -> FloatArray:
+        """Irregularity with what later cuts can make of the half in place of its proportions."""
+        folded = np.exp(np.abs(np.log(np.where(self.aspect > 0, self.aspect, 1.0))))
+        later = np.where(
+            quota > 0,
+            prospect_of_quota(folded, quota),
+            prospect_of_area(folded, np.maximum(content, 1.0)),
+        )
+        own = self.irregularity - self.by_angle
+        uncut = np.where(quota > 0, quota < 2, content < 2.0)
+        shown = np.where(uncut, own, later + OWN_SHARE * own)
+        return np.asarray(
+            np.where(self.aspect > 0, self.by_angle + weight * shown, self.irregularity)
+        )
+
+
 def _half(
     boundary: Boundary,
     parcel: IntArray,
@@ -158,8 +208,8 @@ def _half(
     b: ComplexArray,
     t_a: FloatArray,
     t_b: FloatArray,
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Irregularity, mean side and number of sides of the half that goes a, b, ring, a.
+) -> _Half:
+    """Approximate polygon of the half that goes a, b, ring, a.
 
     The cut counts as one side; corners straighter than 135° are deleted as in the reported
     polygon.
@@ -182,7 +232,7 @@ def _half(
     k = (first[:, None] + np.arange(width)[None]) % n_own[:, None]
     z = np.concatenate([a[:, None], b[:, None], np.take_along_axis(corner_z[parcel], k, axis=1)], axis=1)
     z, n = _thinned(z, count + 2)
-    return (*_irregularity(z, n), n)
+    return _measured(z, n)
 
 
 def _run_start(between: BoolArray, number: IntArray, count: IntArray) -> IntArray:
@@ -227,8 +277,8 @@ def _turns(z: ComplexArray, n: IntArray) -> FloatArray:
     return np.asarray(np.angle((after - z) * np.conj(z - before)))
 
 
-def _irregularity(z: ComplexArray, n: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Eq. 1 and the mean side of padded polygons."""
+def _measured(z: ComplexArray, n: IntArray) -> _Half:
+    """Eq. 1 and the proportions of padded polygons."""
     _, after = _neighbours(z, n)
     valid = np.arange(z.shape[1])[None] < n[:, None]
     side = np.where(valid, np.abs(after - z), 0.0)
@@ -238,7 +288,16 @@ def _irregularity(z: ComplexArray, n: IntArray) -> tuple[FloatArray, FloatArray]
     by_side = (np.where(valid, side - mean_side[:, None], 0.0) ** 2).sum(axis=1) / n
     g_angle, g_side = IRREGULARITY_WEIGHTS
     safe = np.where(mean_side > 0, mean_side, 1.0)
-    return g_angle * by_angle + g_side * by_side / safe**2, mean_side
+    aspect = np.zeros(len(z))
+    quad = np.flatnonzero((n == 4) & (side[:, :4].min(axis=1) > 0)) if z.shape[1] > 3 else []
+    aspect[quad] = (side[quad, 0] + side[quad, 2]) / (side[quad, 1] + side[quad, 3])
+    return _Half(
+        irregularity=g_angle * by_angle + g_side * by_side / safe**2,
+        by_angle=g_angle * by_angle,
+        mean_side=mean_side,
+        n=n,
+        aspect=aspect,
+    )
 
 
 def rank_cuts(boundary: Boundary, scored: ScoredCuts) -> tuple[IntArray, IntArray]:

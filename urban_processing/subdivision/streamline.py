@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from urban_processing.subdivision.cuts import (
     streamline_cuts,
 )
 from urban_processing.subdivision.parcels import Boundary, ParcelRings, boundaries
-from urban_processing.subdivision.score import rank_cuts, score_cuts
+from urban_processing.subdivision.score import ScoredCuts, rank_cuts, score_cuts
 
 FIELD_TOLERANCE = 0.004
 """The field sees rings simplified by this share of √area: collinear vertices cost time."""
@@ -43,7 +44,7 @@ class Cut:
     edge_a, along_a, edge_b, along_b
         Ends: place in the parcel's ring of half-edges, and place (0 to 1) on that half-edge.
     path
-        (n, 2) map positions from a to b, ends included.
+        (n, 2) map positions from near a to near b: snapping has moved the ends alone.
     quality
         Score, the larger the better.
     """
@@ -102,13 +103,8 @@ def propose_cuts(
         )
         chosen, rank = rank_cuts(boundary, scored)
         order = np.lexsort((rank, cuts.parcel[chosen]))
-        chosen = chosen[order]
-        for i, path in zip(chosen.tolist(), cuts.paths(chosen), strict=True):
-            parcel = cuts.parcel[i]
-            cut = _as_cut(
-                boundary, int(parcel), scored.t_a[i], scored.t_b[i], path, scored.quality[i]
-            )
-            out[rows[parcel]].append(cut)
+        for row, cut in _as_cuts(boundary, scored, chosen[order]):
+            out[rows[row]].append(cut)
     return out
 
 
@@ -171,21 +167,27 @@ def _field_rings(
     return rings, np.concatenate([t, close], axis=1)
 
 
-def _as_cut(
-    boundary: Boundary, row: int, t_a: float, t_b: float, path: ComplexArray, quality: float
-) -> Cut:
-    """A cut in terms of the mesh: half-edges of the ring and map positions."""
-    rows, t = np.array([row, row]), np.array([t_a, t_b])
-    edge, along = boundary.locate(rows, t)
-    edge = np.minimum(edge, boundary.rings.count[row] - 1)
-    ends = boundary.position(rows, t)
-    path = _moved_ends(path, ends[0], ends[1])
-    xy = boundary.rings.to_map(np.full(len(path), row), path)
-    return Cut(int(edge[0]), float(along[0]), int(edge[1]), float(along[1]), xy, float(quality))
-
-
-def _moved_ends(path: ComplexArray, a: complex, b: complex) -> ComplexArray:
-    """Move the ends of a path; the points between follow in proportion to the length."""
-    length = np.append(0.0, np.cumsum(np.abs(np.diff(path))))
-    s = length / length[-1] if length[-1] > 0 else np.linspace(0.0, 1.0, len(path))
-    return np.asarray(path + (1 - s) * (a - path[0]) + s * (b - path[-1]))
+def _as_cuts(
+    boundary: Boundary, scored: ScoredCuts, chosen: IntArray
+) -> Iterator[tuple[int, Cut]]:
+    """Chosen cuts in terms of the mesh: half-edges of the ring and map positions."""
+    parcel = scored.cuts.parcel[chosen]
+    last = boundary.rings.count[parcel] - 1
+    edge_a, along_a = boundary.locate(parcel, scored.t_a[chosen])
+    edge_b, along_b = boundary.locate(parcel, scored.t_b[chosen])
+    paths = scored.cuts.paths(chosen)
+    if not paths:
+        return
+    count = np.array([len(path) for path in paths])
+    xy = boundary.rings.to_map(np.repeat(parcel, count), np.concatenate(paths))
+    for row, *ends, path, quality in zip(
+        parcel.tolist(),
+        np.minimum(edge_a, last).tolist(),
+        along_a.tolist(),
+        np.minimum(edge_b, last).tolist(),
+        along_b.tolist(),
+        np.split(xy, np.cumsum(count)[:-1]),
+        scored.quality[chosen].tolist(),
+        strict=True,
+    ):
+        yield row, Cut(*ends, path, quality)

@@ -1,0 +1,88 @@
+"""The library in one call: a boundary in, a layout out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+
+from urban_processing.errors import BoundaryError, ParameterError, UrbanError
+from urban_processing.io.boundaries import read_boundary
+from urban_processing.io.features import Source
+from urban_processing.io.frames import GeoLayout
+from urban_processing.io.rebuild import canonical
+from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.pipelines import cogenerate as pipeline
+from urban_processing.progress import SILENT, Progress
+from urban_processing.site import Site
+
+
+def cogenerate(
+    boundary: Source | Site,
+    *,
+    crs: object = None,
+    layer: str | None = None,
+    where: str | None = None,
+    corners: Source | npt.ArrayLike | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayout:
+    """Divide land into well-shaped parcels, all reached by one connected street network.
+
+    Hierarchical co-generation (Chen 2024, sections 3 and 4): level by level, parcels are cut
+    along streamlines of a cross field and streets are added along parcel boundaries.
+
+    Parameters
+    ----------
+    boundary
+        A file, GeoDataFrame, GeoSeries or shapely polygon, or a `Site`.
+    crs, layer, where, corners
+        As in `urban_processing.io.boundaries.read_boundary`.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `CogenerateParams`; `min_area` (m²) or `parcels` is needed.
+
+    Returns
+    -------
+    GeoLayout
+        Parcels, streets, junctions, metrics and issues.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong; an `UrbanError` where both land and parameters are.
+
+    References
+    ----------
+    Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> layout = cogenerate(shapely.box(0, 0, 200, 120), crs="EPSG:32630", min_area=1500)
+    >>> bool(layout.parcels.area_m2.min() >= 1500)
+    True
+    """
+    errors: list[UrbanError] = []
+    params, site = None, None
+    try:
+        params = CogenerateParams.from_values(parameters)
+    except ParameterError as error:
+        errors.append(error)
+    try:
+        site = _site(boundary, crs=crs, layer=layer, where=where, corners=corners)
+    except BoundaryError as error:
+        errors.append(error)
+    if params is None or site is None:
+        raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
+    return GeoLayout(canonical(pipeline.cogenerate(site, params, progress)))
+
+
+def _site(boundary: Source | Site, **options: Any) -> Site:
+    if not isinstance(boundary, Site):
+        return read_boundary(boundary, **options)
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise BoundaryError(f"A Site is ready as it is: leave out {', '.join(given)}.")
+    return boundary

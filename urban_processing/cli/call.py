@@ -1,0 +1,128 @@
+"""From what was given on the command line to what an algorithm takes, or all that is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
+from urban_processing.cli import stores
+from urban_processing.errors import BoundaryError, UrbanError
+from urban_processing.params.base import Params, option_name
+
+
+class BadCall(UrbanError):
+    """Something is wrong with what was given on the command line."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """All that a run needs."""
+
+    inputs: Mapping[str, Any]
+    params: Params
+
+
+def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
+    """Check everything, read the inputs, and report all the mistakes of the call together.
+
+    Raises
+    ------
+    BadCall
+        With one sentence for each mistake.
+    DependencyError
+        If a place cannot be looked up.
+    """
+    names = [field.name for field in spec.params.fields()]
+    values = {name: given[name] for name in names if given[name] is not None}
+    problems = spec.params.problems_with(values)
+    problems += _output_problems(spec, given)
+    inputs: dict[str, Any] = {}
+    for item in spec.inputs:
+        if item.kind is not InputKind.CORNER_POINTS:
+            inputs[item.name] = _read(spec, item, given, problems)
+    if problems:
+        raise BadCall(problems)
+    return Call(inputs, spec.params.from_values(values))
+
+
+def _read(spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]) -> Any:
+    """Read one input; None where it was not given or is added to `problems`."""
+    if given[item.name] is None and not item.required:
+        return None
+    try:
+        if item.kind is InputKind.BOUNDARY:
+            return _boundary(spec, item, given, problems)
+        if given[item.name] is None:
+            problems.append(f"Give {option_name(item.name).upper()}, {_lower_first(item.help)}")
+            return None
+        from urban_processing.io.files import read_layout
+
+        return read_layout(given[item.name]).layout
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _boundary(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    source, place = given[item.name], given["place"]
+    metavar = option_name(item.name).upper()
+    if source is not None and place is not None:
+        problems.append(f"Give {metavar} or --place, not both.")
+    if source is None and place is None:
+        problems.append(f"Give {metavar}, a file with the land, or --place with a name.")
+    if place is not None and (given["layer"] is not None or given["where"] is not None):
+        problems.append(
+            "--layer and --where choose features of a file: leave them out with --place."
+        )
+    if source is None:
+        if problems:  # no call over the network for a run that cannot begin
+            return None
+        from urban_processing.io.places import fetch_place
+
+        source = fetch_place(place)
+    from urban_processing.io.boundaries import read_boundary
+
+    corners = [i.name for i in spec.inputs if i.kind is InputKind.CORNER_POINTS]
+    return read_boundary(
+        source,
+        layer=None if place is not None else given["layer"],
+        where=None if place is not None else given["where"],
+        crs=given["crs"],
+        corners=given[corners[0]] if corners else None,
+    )
+
+
+def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]:
+    problems: list[str] = []
+    taken = {
+        Path(given[item.name]).resolve(): f"the input {given[item.name]}"
+        for item in spec.inputs
+        if given[item.name] is not None
+    }
+    for output in spec.outputs:
+        path = given[output.name]
+        if path is None:
+            if output.required:
+                problems.append(f"Say where the result goes: {_flags(output)} FILE.")
+            continue
+        problems += stores.problems(output, given)
+        place = Path(path).resolve()
+        if place in taken:
+            problems.append(
+                f"{_flags(output)} {path} would replace {taken[place]}: choose another."
+            )
+        taken.setdefault(place, _flags(output))
+    return problems
+
+
+def _flags(output: Output) -> str:
+    return "-o" if output.kind is OutputKind.LAYOUT else f"--{option_name(output.name)}"
+
+
+def _lower_first(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]

@@ -1,0 +1,164 @@
+"""Options of a command, made from an algorithm's declaration."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
+from urban_processing.algorithms.words import default_in_words, limits_in_words
+from urban_processing.params.base import ParamField, option_name
+
+INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
+"""Panels of the help page."""
+
+_UNITS = {"m": "METRES", "m²": "M²", "°": "DEGREES"}
+
+
+class PanelOption(click.Option):
+    """An option that knows the panel of the help page it stands in, and a note on its values."""
+
+    def __init__(self, *args: Any, panel: str, note: str = "", **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.panel = panel
+        self.note = note
+
+
+class Unchecked(click.ParamType):
+    """A value that is checked later, so that all the mistakes of a call are said together."""
+
+    name = "text"
+
+    def __init__(self, choices: tuple[str, ...] = ()) -> None:
+        self.choices = choices
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Complete the choices; a value without choices is completed as nothing."""
+        del ctx, param
+        return [CompletionItem(c) for c in self.choices if c.startswith(incomplete)]
+
+
+def command_parameters(spec: AlgorithmSpec) -> list[click.Parameter]:
+    """Return the arguments and options of an algorithm's command."""
+    parameters: list[click.Parameter] = []
+    for item in spec.inputs:
+        parameters += _input_parameters(item)
+    for output in spec.outputs:
+        parameters += _output_options(output)
+    parameters += _writing_options(spec)
+    for panel, fields in spec.panels().items():
+        parameters += [parameter_option(field, panel) for field in fields]
+    quiet = "Say nothing but warnings and errors."
+    parameters.append(_option("--quiet", "-q", is_flag=True, panel=OTHER, help=quiet))
+    return parameters
+
+
+def parameter_option(field: ParamField, panel: str) -> PanelOption:
+    """Return the option of one parameter; its value is checked by the parameter class."""
+    flag = f"--{option_name(field.name)}"
+    notes = [limits_in_words(field)]
+    if default_in_words(field):
+        notes.append(f"default {default_in_words(field)}")
+    kind: Unchecked | None = None
+    metavar: str | None = None
+    if field.kind is bool:
+        flag = f"{flag}/--no-{option_name(field.name)}"
+    elif issubclass(field.kind, enum.Enum):
+        choices = tuple(str(member.value) for member in field.kind)
+        notes.insert(0, ", ".join(choices))
+        kind, metavar = Unchecked(choices), "CHOICE"
+    else:
+        kind = Unchecked()
+        metavar = _UNITS.get(field.param.unit) or {int: "N", float: "NUMBER"}.get(
+            field.kind, "TEXT"
+        )
+    return PanelOption(
+        [flag],
+        type=kind,
+        metavar=metavar,
+        default=None,
+        help=field.param.help,
+        panel=panel,
+        note="; ".join(note for note in notes if note),
+    )
+
+
+def _option(*flags: str, **kwargs: Any) -> PanelOption:
+    return PanelOption(list(flags), **kwargs)
+
+
+def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
+    return _option(*flags, type=click.Path(), metavar=metavar, **kwargs)
+
+
+def _input_parameters(item: Input) -> list[click.Parameter]:
+    if item.kind is InputKind.CORNER_POINTS:
+        return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
+    argument = HelpArgument(
+        [item.name],
+        required=False,
+        type=click.Path(),
+        metavar=option_name(item.name).upper(),
+        help=item.help,
+    )
+    if item.kind is InputKind.LAYOUT:
+        return [argument]
+    place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
+    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
+    return [
+        argument,
+        _option("--place", metavar="NAME", panel=INPUT, help=place),
+        _option("--layer", metavar="NAME", panel=INPUT, help="Layer of a file that has several."),
+        _option(
+            "--where",
+            metavar="FILTER",
+            panel=INPUT,
+            help="Which features to take, as after WHERE in SQL: \"name = 'Schaan'\".",
+        ),
+        _option("--crs", metavar="CODE", panel=INPUT, help=crs),
+    ]
+
+
+class HelpArgument(click.Argument):
+    """An argument with a help text."""
+
+    def __init__(self, *args: Any, help: str, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.help = help
+
+
+def _writing_options(spec: AlgorithmSpec) -> list[click.Parameter]:
+    replace = "Replace files that exist already."
+    options: list[click.Parameter] = [
+        _option("--overwrite", is_flag=True, panel=OUTPUT, help=replace)
+    ]
+    if any(output.kind is OutputKind.LAYOUT for output in spec.outputs):
+        seconds = "Record how long the run took; the same seed then no longer gives the same bytes."
+        options.append(_option("--record-seconds", is_flag=True, panel=OUTPUT, help=seconds))
+    return options
+
+
+def _output_options(output: Output) -> list[click.Parameter]:
+    flag = f"--{option_name(output.name)}"
+    if output.kind is OutputKind.LAYOUT:
+        return [_file("-o", flag, panel=OUTPUT, help=output.help, note=".gpkg")]
+    if output.kind is OutputKind.MAP:
+        return [_file(flag, panel=OUTPUT, help=output.help, note=".png, .svg or .pdf")]
+    formats = ("geojson", "parquet")
+    return [
+        _file(flag, metavar="FOLDER", panel=OUTPUT, help=output.help),
+        _option(
+            f"{flag}-format",
+            type=Unchecked(formats),
+            metavar="CHOICE",
+            default=formats[0],
+            panel=OUTPUT,
+            help="Format of these files; GeoJSON is in WGS 84.",
+            note=f"{', '.join(formats)}; default {formats[0]}",
+        ),
+    ]

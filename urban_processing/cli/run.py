@@ -1,0 +1,72 @@
+"""One run of an algorithm from the command line."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from urban_processing.algorithms.spec import (
+    MANY_PARCELS,
+    AlgorithmSpec,
+    Estimate,
+    InputKind,
+    OutputKind,
+)
+from urban_processing.cli import stores
+from urban_processing.cli.call import Call, prepare
+from urban_processing.cli.summary import duration, summary
+from urban_processing.cli.terminal import Terminal
+
+
+_FILE_NAMES = {
+    OutputKind.LAYOUT: "layout",
+    OutputKind.MAP: "picture",
+    OutputKind.EXPORT: "export",
+}
+
+
+def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Terminal) -> None:
+    """Read, say what is to come, run, write, sum up.
+
+    Raises
+    ------
+    UrbanError
+        With everything that is wrong with the call, or why the run failed.
+    """
+    call = prepare(spec, given)
+    _say_what_inputs_say(spec, call, terminal)
+    if spec.estimate is not None:
+        _announce(spec.estimate(call.inputs, call.params), terminal)
+    started = time.perf_counter()
+    with terminal.progress(spec.title) as progress:
+        made = spec.run(call.inputs, call.params, progress)
+    rows = [("time", duration(time.perf_counter() - started))]
+    files = []
+    for output in spec.outputs:
+        if given[output.name] is not None:
+            stored = made[output.of or output.name]
+            files.append((_FILE_NAMES[output.kind], str(stores.write(output, stored, given))))
+    for output in spec.outputs:
+        if not output.of:
+            rows = [*summary(output.kind, made[output.name]), *rows]
+    terminal.table([*rows, *files])
+
+
+def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) -> None:
+    """Repeat on stderr what was repaired or changed in reading a boundary."""
+    for item in spec.inputs:
+        if item.kind is InputKind.BOUNDARY:
+            for issue in call.inputs[item.name].issues:
+                terminal.note(issue.message)
+
+
+def _announce(estimate: Estimate, terminal: Terminal) -> None:
+    what = f"about {estimate.parcels:,} parcels, about {duration(estimate.seconds)}"
+    if estimate.parcels > MANY_PARCELS:
+        terminal.warn(
+            f"This run is large: {what}. A larger smallest area, or fewer parcels, is quicker; "
+            "Ctrl-C stops it."
+        )
+    else:
+        terminal.note(f"Expected: {what}.")

@@ -1,0 +1,54 @@
+"""Where outputs go: the checks before a run, and the writing after it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from urban_processing.algorithms.spec import Output, OutputKind
+
+
+def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
+    """Return one sentence for each reason why an output cannot be written where it is to go."""
+    path, overwrite = Path(given[output.name]), given["overwrite"]
+    if output.kind is OutputKind.LAYOUT:
+        from urban_processing.io.files import check_output
+
+        return check_output(path, overwrite=overwrite)
+    if output.kind is OutputKind.MAP:
+        from urban_processing.report.map import check_map_output
+
+        return [*check_map_output(path), *_in_the_way(path, overwrite)]
+    from urban_processing.io.exports import check_export
+
+    return check_export(path, kind=given[_format(output)], overwrite=overwrite)
+
+
+def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
+    """Write an output and return where it is."""
+    path, overwrite = Path(given[output.name]), given["overwrite"]
+    if output.kind is OutputKind.LAYOUT:
+        from urban_processing.io.files import write_layout
+
+        return write_layout(made, path, overwrite=overwrite, record_seconds=given["record_seconds"])
+    if output.kind is OutputKind.MAP:
+        from urban_processing.report.map import plot_layout
+
+        plot_layout(made, path)
+        return path
+    from urban_processing.io.exports import export_layout
+
+    return export_layout(made, path, kind=given[_format(output)], overwrite=overwrite)
+
+
+def _format(output: Output) -> str:
+    return f"{output.name}_format"
+
+
+def _in_the_way(path: Path, overwrite: bool) -> list[str]:
+    if path.is_file() and not overwrite:
+        return [
+            f"The {path} exists already: choose another name, or allow overwriting (--overwrite)."
+        ]
+    return []

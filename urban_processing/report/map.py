@@ -1,0 +1,373 @@
+"""Maps of layouts as PNG, SVG or PDF."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import Normal, withStroke
+
+from urban_processing.errors import OutputError, ParameterError
+from urban_processing.layout import Layout
+from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.schema import PARCELS, ColumnType
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from urban_processing.io.frames import GeoLayout
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""Kinds of files that a map can be written to."""
+
+IRREGULAR = 0.1
+"""Parcels with a larger irregularity are tinted (Chen 2024, Fig. 17)."""
+
+STRONGLY_IRREGULAR = 0.5
+"""Irregularity from which the tint has its full strength."""
+
+DOTS_PER_INCH = 200
+
+FloatArray = npt.NDArray[np.float64]
+
+_INK, _FAINT = "#4a463f", "#8c8579"
+_PARCEL, _OUTLINE = "#f6f4ee", "#aaa396"
+_TRIANGLE = "#b6a0d6"
+_IRREGULAR_RAMP = LinearSegmentedColormap.from_list("irregular", ["#f9dcd0", "#ee8f76", "#d0342c"])
+_VALUE_RAMP = LinearSegmentedColormap.from_list(
+    "value", ["#f7f3dc", "#b9dcc0", "#63b3bd", "#2f7aa8", "#2b4a86"]
+)
+_STREET, _CASING = "#ffcc46", "#8a6b1f"
+_PLAIN_STREET, _PLAIN_CASING = "#ffffff", "#8c8579"
+_REPRODUCIBLE = {"svg.hashsalt": "urban_processing", "svg.fonttype": "path"}
+_NO_DATES: dict[str, dict[str, Any]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None, "ModDate": None},
+}
+
+
+class MapFigure(Figure):
+    """A figure that notebooks show without a plotting backend."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=DOTS_PER_INCH / 2)
+        return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Sizes on paper.
+
+    Parameters
+    ----------
+    points_per_metre
+        Of paper and of ground.
+    side
+        Typical side of a parcel in metres.
+    text
+        Size of letters in points.
+    """
+
+    points_per_metre: float
+    side: float
+    text: float
+
+    @property
+    def parcel_points(self) -> float:
+        return self.side * self.points_per_metre
+
+    @property
+    def outline(self) -> float:
+        return float(np.clip(0.025 * self.parcel_points, 0.12, 0.6))
+
+    @property
+    def casing(self) -> float:
+        return float(np.clip(0.035 * self.parcel_points, 0.2, 0.7))
+
+    def street(self, width_m: FloatArray) -> FloatArray:
+        """Line widths in points: true to scale within what reads well beside parcels."""
+        shown = np.clip(width_m, 0.11 * self.side, 0.2 * self.side)
+        # classes stay apart where all true widths are out of range
+        shown = shown * np.clip(width_m / np.median(width_m), 0.8, 1.25) ** 0.5
+        return np.asarray(np.maximum(shown * self.points_per_metre, 0.45))
+
+
+def plot_layout(
+    layout: GeoLayout | Layout,
+    path: str | PathLike[str] | None = None,
+    *,
+    ax: Axes | None = None,
+    colour_by: str | None = None,
+    title: str = "",
+    size: float | None = None,
+) -> Figure:
+    """Draw the map of a layout: parcels, streets with casing, scale bar and legend.
+
+    Irregular parcels (irregularity above 0.1) are red, the more so the more irregular they
+    are, and triangles violet, as in Chen 2024, Fig. 17. Street widths are true to scale where
+    that reads well. No plotting state of the caller is touched.
+
+    Parameters
+    ----------
+    layout
+        The layout.
+    path
+        File to write: ``.png``, ``.svg`` or ``.pdf``. The same layout gives the same SVG.
+    ax
+        Axes to draw into, by default a new figure in the shape of the land.
+    colour_by
+        Column of numbers of the parcels to colour by, such as ``area_m2`` or ``frontage_m``.
+    title
+        Heading, none by default.
+    size
+        Longer side of the figure in inches, by default more the more parcels there are.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    OutputError
+        If `path` has another suffix or cannot be written.
+    ParameterError
+        If `colour_by` is no column of numbers.
+    """
+    _check_colour_by(colour_by)
+    target = None if path is None else _checked(Path(path))
+    tables = layout_tables(layout) if isinstance(layout, Layout) else layout.tables
+    figure = None
+    if ax is None:
+        figure, ax = _new_axes(tables, title, size)
+    _draw(ax, tables, colour_by)
+    figure = ax.get_figure(root=True) if figure is None else figure
+    if figure is None:
+        raise ParameterError("ax belongs to no figure.")
+    if target is not None:
+        _save(figure, target)
+    return figure
+
+
+def check_map_output(path: str | PathLike[str]) -> list[str]:
+    """Return why a map cannot be written to a path; nothing where it can."""
+    from urban_processing.io.files import folder_problems
+
+    target = Path(path)
+    problems = folder_problems(target.parent)
+    if target.suffix.lower() not in SUFFIXES:
+        problems.append(f"The map {target} must end in one of {', '.join(SUFFIXES)}.")
+    if target.is_dir():
+        problems.append(f"The map {target} is a folder: give the name of a file.")
+    return problems
+
+
+def _checked(path: Path) -> Path:
+    problems = check_map_output(path)
+    if problems:
+        raise OutputError(problems)
+    return path
+
+
+def _check_colour_by(name: str | None) -> None:
+    numbers = [c.name for c in PARCELS.columns if c.dtype is not ColumnType.TEXT]
+    if name is not None and name not in numbers:
+        raise ParameterError(f"colour-by must be one of {', '.join(numbers)}; got {name!r}.")
+
+
+def _save(figure: Figure, path: Path) -> None:
+    suffix = path.suffix.lower()
+    drawn = io.BytesIO()
+    with mpl.rc_context(_REPRODUCIBLE):
+        figure.savefig(drawn, format=suffix[1:], dpi=DOTS_PER_INCH, metadata=_NO_DATES[suffix])
+    try:
+        path.write_bytes(drawn.getvalue())
+    except OSError as error:
+        raise OutputError(f"The map {path} cannot be written: {error.strerror}.") from error
+
+
+def _new_axes(
+    tables: dict[str, Table], title: str, size: float | None
+) -> tuple[Figure, Axes]:
+    """A figure in the shape of the land, with strips for the title and the legend."""
+    x0, y0, x1, y1 = _extent(tables)
+    longer = _longer_side(tables) if size is None else size
+    factor = longer / max(x1 - x0, y1 - y0)
+    text = _text_points(longer) / 8
+    margin, head, foot = 0.2, 0.4 * text if title else 0.0, 0.42 * text
+    width = max(factor * (x1 - x0), 5.5) + 2 * margin
+    height = factor * (y1 - y0) + 2 * margin + head + foot
+    figure = MapFigure(figsize=(width, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    ax = figure.add_axes(
+        (
+            margin / width,
+            (foot + margin) / height,
+            1 - 2 * margin / width,
+            1 - (2 * margin + head + foot) / height,
+        )
+    )
+    if title:
+        figure.text(
+            margin / width,
+            1 - 0.16 / height,
+            title,
+            va="top",
+            size=13 * text,
+            weight="bold",
+            color=_INK,
+        )
+    return figure, ax
+
+
+def _longer_side(tables: dict[str, Table]) -> float:
+    """Longer side of a figure in inches in which parcels can be told apart."""
+    x0, y0, x1, y1 = _extent(tables)
+    land = float(tables["boundary"]["area_m2"].sum())
+    spread = min((x1 - x0) * (y1 - y0) / land, 6.0)
+    return float(np.clip(0.15 * (len(tables["parcels"]) * spread) ** 0.5 + 5.5, 7.0, 22.0))
+
+
+def _text_points(longer: float) -> float:
+    return float(np.clip(0.75 * longer, 8.0, 13.0))
+
+
+def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
+    x0, y0, x1, y1 = _extent(tables)
+    ax.set_aspect("equal")
+    pad = 0.012 * max(x1 - x0, y1 - y0)
+    ax.set_xlim(x0 - pad, x1 + pad)
+    ax.set_ylim(y0 - pad, y1 + pad)
+    ax.axis("off")
+    scale = _scale(ax, tables)
+    _draw_parcels(ax, tables["parcels"], scale, colour_by)
+    _draw_rim(ax, tables["boundary"], scale)
+    colours = (_STREET, _CASING) if colour_by is None else (_PLAIN_STREET, _PLAIN_CASING)
+    _draw_streets(ax, tables["streets"], tables["junctions"], scale, colours)
+    _draw_scale_bar(ax, scale)
+    _draw_legend(ax, _legend_entries(tables, colour_by, colours), scale)
+    if colour_by is not None:
+        _draw_colour_bar(ax, colour_by, scale)
+
+
+def _extent(tables: dict[str, Table]) -> tuple[float, float, float, float]:
+    x0, y0, x1, y1 = shapely.total_bounds(tables["boundary"].geometry)
+    return float(x0), float(y0), float(x1), float(y1)
+
+
+def _scale(ax: Axes, tables: dict[str, Table]) -> _Scale:
+    """Points on paper for each metre on the ground, at equal aspect."""
+    figure = ax.get_figure(root=True)
+    x0, y0, x1, y1 = ax.get_window_extent().extents * (72 / figure.dpi if figure else 1.0)
+    left, right = ax.get_xlim()
+    bottom, top = ax.get_ylim()
+    points = min((x1 - x0) / (right - left), (y1 - y0) / (top - bottom))
+    side = float(np.sqrt(np.median(tables["parcels"]["area_m2"])))
+    return _Scale(points, side, _text_points(max(x1 - x0, y1 - y0) / 72))
+
+
+def _draw_rim(ax: Axes, boundary: Table, scale: _Scale) -> None:
+    """The land's outline and its holes, where no street covers them."""
+    outlines = [_outline(polygon) for polygon in _polygons(boundary)]
+    ax.add_collection(
+        PathCollection(
+            outlines,
+            facecolors="none",
+            edgecolors=_FAINT,
+            linewidths=1.8 * scale.outline,
+            joinstyle="round",
+            zorder=1.5,
+        )
+    )
+
+
+def _polygons(table: Table) -> npt.NDArray[np.object_]:
+    parts = shapely.get_parts(_geometry(table))
+    return np.asarray(parts, dtype=object)
+
+
+def _draw_parcels(ax: Axes, parcels: Table, scale: _Scale, colour_by: str | None) -> None:
+    collection = PathCollection(
+        [_outline(polygon) for polygon in _geometry(parcels)],
+        facecolors=_parcel_colours(parcels),
+        edgecolors=_OUTLINE,
+        linewidths=scale.outline,
+        joinstyle="round",
+        zorder=1,
+    )
+    if colour_by is not None:
+        collection.set_array(np.asarray(parcels[colour_by], dtype=np.float64))
+        collection.set_cmap(_VALUE_RAMP)
+        collection.set_norm(_value_range(parcels[colour_by]))
+    ax.add_collection(collection)
+
+
+def _value_range(values: npt.NDArray[Any]) -> Normalize:
+    """Range of colours that single extreme values do not flatten."""
+    known = np.asarray(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    if len(known) == 0:
+        return Normalize(0.0, 1.0)
+    low, high = np.percentile(known, [1, 99])
+    return Normalize(low, high if high > low else low + 1.0)
+
+
+def _parcel_colours(parcels: Table) -> FloatArray:
+    colours = np.tile(to_rgb(_PARCEL), (len(parcels), 1))
+    irregularity = parcels["irregularity"]
+    irregular = irregularity > IRREGULAR
+    strength = (irregularity[irregular] - IRREGULAR) / (STRONGLY_IRREGULAR - IRREGULAR)
+    colours[irregular] = _IRREGULAR_RAMP(np.clip(strength, 0, 1))[:, :3]
+    colours[parcels["sides"] == 3] = to_rgb(_TRIANGLE)
+    return colours
+
+
+def _outline(polygon: shapely.Polygon) -> Outline:
+    rings = [polygon.exterior, *polygon.interiors]
+    paths = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings]
+    return paths[0] if len(paths) == 1 else Outline.make_compound_path(*paths)
+
+
+def _draw_streets(
+    ax: Axes, streets: Table, junctions: Table, scale: _Scale, colours: tuple[str, str]
+) -> None:
+    """All casings below all fills, so that crossings are open."""
+    lines = [shapely.get_coordinates(line) for line in _geometry(streets)]
+    if not lines:
+        return
+    width = scale.street(streets["width_m"])
+    ends = shapely.get_coordinates(_geometry(junctions)[junctions["kind"] == "end"])
+    fill, casing = colours
+    for colour, margin, zorder in ((casing, 2 * scale.casing, 2), (fill, 0.0, 3)):
+        ax.add_collection(
+            LineCollection(
+                lines,
+                colors=colour,
+                linewidths=width + margin,
+                capstyle="round",
+                joinstyle="round",
+                zorder=zorder,
+            )
+        )
+        size = 2.0 * float(np.median(width)) + margin
+        ax.scatter(*ends.T, s=size**2, c=colour, linewidths=0, zorder=zorder)
+
+
+def _geometry(table: Table) -> npt.NDArray[np.object_]:
+    return np.empty(0, dtype=object) if table.geometry is None else table.geometry
