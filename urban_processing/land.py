@@ -13,7 +13,7 @@ from urban_processing.mesh.corners import STRAIGHT_ANGLE, interior_angles, sharp
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, PlanarMesh
 from urban_processing.site import GRID, Issue, Site
 
-SIMPLIFY_SHARE = 0.25
+SIMPLIFY_SHARE = 0.3
 """Default tolerance of the simplification, in sides of the smallest parcel: notches that are
 smaller than a parcel make parcels that nobody wants."""
 

@@ -149,7 +149,7 @@ class AlgorithmSpec:
 
     def __post_init__(self) -> None:
         fields = [field.name for field in self.params.fields()]
-        names = [item.name for item in (*self.inputs, *self.outputs)] + fields
+        names = [i.name for i in self.inputs] + [o.name for o in self.outputs] + fields
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")

@@ -10,11 +10,11 @@ from rich.text import Text
 
 from urban_processing.algorithms import AlgorithmSpec, get, specs
 from urban_processing.cli import help as help_pages
-from urban_processing.cli.help import PanelCommand
+from urban_processing.cli.call import BadCallError
 from urban_processing.cli.command import AlgorithmCommand
+from urban_processing.cli.help import PanelCommand
 from urban_processing.cli.options import HelpArgument
 from urban_processing.cli.terminal import Terminal, plain_table
-from urban_processing.cli.call import BadCall
 from urban_processing.errors import (
     BoundaryError,
     Cancelled,
@@ -40,7 +40,7 @@ class App(click.Group):
         except (KeyboardInterrupt, Cancelled):
             click.echo("Stopped; no file was left half-written.", err=True)
             ctx.exit(STOPPED)
-        except (BadCall, ParameterError, BoundaryError) as error:
+        except (BadCallError, ParameterError, BoundaryError) as error:
             Terminal().error(error.problems)
             ctx.exit(BAD_CALL)
         except UrbanError as error:

@@ -13,7 +13,7 @@ from urban_processing.errors import BoundaryError, UrbanError
 from urban_processing.params.base import Params, option_name
 
 
-class BadCall(UrbanError):
+class BadCallError(UrbanError):
     """Something is wrong with what was given on the command line."""
 
 
@@ -30,7 +30,7 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
 
     Raises
     ------
-    BadCall
+    BadCallError
         With one sentence for each mistake.
     DependencyError
         If a place cannot be looked up.
@@ -44,7 +44,7 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
         if item.kind is not InputKind.CORNER_POINTS:
             inputs[item.name] = _read(spec, item, given, problems)
     if problems:
-        raise BadCall(problems)
+        raise BadCallError(problems)
     return Call(inputs, spec.params.from_values(values))
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
 from urban_processing.algorithms.words import default_in_words, limits_in_words
@@ -14,6 +14,8 @@ from urban_processing.params.base import ParamField, option_name
 
 INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
 """Panels of the help page."""
+
+Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
 _UNITS = {"m": "METRES", "m²": "M²", "°": "DEGREES"}
 
@@ -25,22 +27,6 @@ class PanelOption(click.Option):
         super().__init__(*args, **kwargs)
         self.panel = panel
         self.note = note
-
-
-class Unchecked(click.ParamType):
-    """A value that is checked later, so that all the mistakes of a call are said together."""
-
-    name = "text"
-
-    def __init__(self, choices: tuple[str, ...] = ()) -> None:
-        self.choices = choices
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Complete the choices; a value without choices is completed as nothing."""
-        del ctx, param
-        return [CompletionItem(c) for c in self.choices if c.startswith(incomplete)]
 
 
 def command_parameters(spec: AlgorithmSpec) -> list[click.Parameter]:
@@ -64,28 +50,32 @@ def parameter_option(field: ParamField, panel: str) -> PanelOption:
     notes = [limits_in_words(field)]
     if default_in_words(field):
         notes.append(f"default {default_in_words(field)}")
-    kind: Unchecked | None = None
+    complete: Completion | None = None
     metavar: str | None = None
     if field.kind is bool:
         flag = f"{flag}/--no-{option_name(field.name)}"
     elif issubclass(field.kind, enum.Enum):
         choices = tuple(str(member.value) for member in field.kind)
         notes.insert(0, ", ".join(choices))
-        kind, metavar = Unchecked(choices), "CHOICE"
+        complete, metavar = _completing(*choices), "CHOICE"
     else:
-        kind = Unchecked()
         metavar = _UNITS.get(field.param.unit) or {int: "N", float: "NUMBER"}.get(
             field.kind, "TEXT"
         )
     return PanelOption(
         [flag],
-        type=kind,
+        shell_complete=complete,
         metavar=metavar,
         default=None,
         help=field.param.help,
         panel=panel,
         note="; ".join(note for note in notes if note),
     )
+
+
+def _completing(*choices: str) -> Completion:
+    """Complete choices in the shell; they are checked with all else, not by the parser."""
+    return lambda _ctx, _param, begun: [c for c in choices if c.startswith(begun)]
 
 
 def _option(*flags: str, **kwargs: Any) -> PanelOption:
@@ -154,7 +144,7 @@ def _output_options(output: Output) -> list[click.Parameter]:
         _file(flag, metavar="FOLDER", panel=OUTPUT, help=output.help),
         _option(
             f"{flag}-format",
-            type=Unchecked(formats),
+            shell_complete=_completing(*formats),
             metavar="CHOICE",
             default=formats[0],
             panel=OUTPUT,

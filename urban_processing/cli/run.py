@@ -18,7 +18,6 @@ from urban_processing.cli.call import Call, prepare
 from urban_processing.cli.summary import duration, summary
 from urban_processing.cli.terminal import Terminal
 
-
 _FILE_NAMES = {
     OutputKind.LAYOUT: "layout",
     OutputKind.MAP: "picture",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from urban_processing.algorithms.spec import Output, OutputKind
+from urban_processing.errors import ParameterError
 
 
 def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
@@ -22,7 +23,10 @@ def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
         return [*check_map_output(path), *_in_the_way(path, overwrite)]
     from urban_processing.io.exports import check_export
 
-    return check_export(path, kind=given[_format(output)], overwrite=overwrite)
+    try:
+        return check_export(path, kind=given[_format(output)], overwrite=overwrite)
+    except ParameterError as error:
+        return list(error.problems)
 
 
 def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:

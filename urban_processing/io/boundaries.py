@@ -302,9 +302,7 @@ def _digest(polygons: npt.NDArray[np.object_], crs: pyproj.CRS | None) -> str:
     return hashlib.sha256(b"".join([*wkb, crs_rules.crs_text(crs).encode()])).hexdigest()
 
 
-def _read_corners(
-    corners: Source | npt.ArrayLike | None, problems: list[str]
-) -> Features | None:
+def _read_corners(corners: Source | npt.ArrayLike | None, problems: list[str]) -> Features | None:
     if corners is None:
         return None
     try:

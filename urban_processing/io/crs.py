@@ -214,7 +214,9 @@ def _cell_area(crs: pyproj.CRS, lat: FloatArray, step: float) -> FloatArray:
     """Area in m² of a cell of `step` by `step` radians on the ellipsoid of a CRS."""
     ellipsoid = crs.ellipsoid or WGS84.ellipsoid
     if ellipsoid is None:
-        raise BoundaryError(f"The CRS {crs.name} has no ellipsoid: choose another with crs (--crs).")
+        raise BoundaryError(
+            f"The CRS {crs.name} has no ellipsoid: choose another with crs (--crs)."
+        )
     a, b = ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre
     e2 = 1.0 - (b / a) ** 2
     w2 = 1.0 - e2 * np.sin(lat) ** 2

@@ -147,7 +147,9 @@ def _read_file(path: str, layer: str | None, where: str | None) -> Features:
     if wkb is None:
         raise BoundaryError(f"Layer {layer!r} of {path} is a table without geometry.")
     crs = _usable(meta["crs"])
-    return Features(np.asarray(shapely.from_wkb(wkb), dtype=object), crs, path)
+    with np.errstate(invalid="ignore"):  # coordinates that are not finite are told of later
+        geometry = np.asarray(shapely.from_wkb(wkb), dtype=object)
+    return Features(geometry, crs, path)
 
 
 def _choose_layer(path: str, layer: str | None) -> str:
@@ -161,14 +163,10 @@ def _choose_layer(path: str, layer: str | None) -> str:
     names = [str(name) for name in layers[:, 0]]
     if layer is not None:
         if layer not in names:
-            raise BoundaryError(
-                f"{path} has no layer {layer!r}; its layers are {_listed(names)}."
-            )
+            raise BoundaryError(f"{path} has no layer {layer!r}; its layers are {_listed(names)}.")
         return layer
     spatial = [str(name) for name, kind in layers if kind is not None]
-    polygons = [
-        str(name) for name, kind in layers if kind is not None and _may_hold_polygons(kind)
-    ]
+    polygons = [str(name) for name, kind in layers if kind is not None and _may_hold_polygons(kind)]
     candidates = polygons or spatial or names
     if _PREFERRED_LAYER in candidates:
         return _PREFERRED_LAYER

@@ -134,9 +134,7 @@ class GeoLayout:
         """Write a GeoPackage; see `urban_processing.io.files.write_layout`."""
         from urban_processing.io.files import write_layout
 
-        return write_layout(
-            self.layout, path, overwrite=overwrite, record_seconds=record_seconds
-        )
+        return write_layout(self.layout, path, overwrite=overwrite, record_seconds=record_seconds)
 
     def __repr__(self) -> str:
         tables = self.tables
@@ -165,6 +163,6 @@ def table_frame(name: str, table: Table | None, *, crs: str) -> gpd.GeoDataFrame
             columns[column.name] = np.asarray(values, dtype=column.dtype.value)
     if declared.geometry is GeometryType.NONE:
         return pd.DataFrame(columns)
-    empty = table is None or table.geometry is None
-    geometry = np.empty(0, dtype=object) if empty else table.geometry
+    known = None if table is None else table.geometry
+    geometry = np.empty(0, dtype=object) if known is None else known
     return gpd.GeoDataFrame(columns, geometry=gpd.GeoSeries(geometry, crs=crs or None))

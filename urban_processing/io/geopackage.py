@@ -65,9 +65,7 @@ CREATE TABLE gpkg_data_column_constraints (
 """
 
 
-def write_geopackage(
-    path: Path, tables: Mapping[str, Table], *, crs: str, state: str
-) -> None:
+def write_geopackage(path: Path, tables: Mapping[str, Table], *, crs: str, state: str) -> None:
     """Write tables as the layers of a new GeoPackage, with QGIS styles and column names.
 
     Parameters

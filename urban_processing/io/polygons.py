@@ -80,9 +80,7 @@ def clean_polygons(features: Features) -> Cleaned:
     return Cleaned(land, polygons, tuple(report.notes))
 
 
-def _polygons_of(
-    features: Features, report: _Report
-) -> tuple[ObjectArray, npt.NDArray[np.int64]]:
+def _polygons_of(features: Features, report: _Report) -> tuple[ObjectArray, npt.NDArray[np.int64]]:
     """Single polygons without heights, and the row of the feature each comes from."""
     geometry = features.geometry
     name = features.name
@@ -133,9 +131,7 @@ def _counted(geometries: ObjectArray) -> str:
     )
 
 
-def _check_finite(
-    polygons: ObjectArray, feature: npt.NDArray[np.int64], report: _Report
-) -> None:
+def _check_finite(polygons: ObjectArray, feature: npt.NDArray[np.int64], report: _Report) -> None:
     xy, owner = shapely.get_coordinates(polygons, return_index=True)
     bad = np.unique(feature[owner[~np.isfinite(xy).all(axis=1)]])
     if len(bad):

@@ -79,12 +79,14 @@ def _renderer(rules: Sequence[_Rule], *, symbol_levels: bool) -> ET.Element:
 
 
 def _layer(
-    kind: str, options: Mapping[str, str], *, level: int = 0, data_defined: Mapping[str, str] | None = None
+    kind: str,
+    options: Mapping[str, str],
+    *,
+    level: int = 0,
+    data_defined: Mapping[str, str] | None = None,
 ) -> ET.Element:
     """One symbol layer; `data_defined` gives expressions for properties."""
-    layer = ET.Element(
-        "layer", {"class": kind, "enabled": "1", "locked": "0", "pass": str(level)}
-    )
+    layer = ET.Element("layer", {"class": kind, "enabled": "1", "locked": "0", "pass": str(level)})
     table = ET.SubElement(layer, "Option", type="Map")
     for key, value in options.items():
         ET.SubElement(table, "Option", name=key, value=value, type="QString")
@@ -163,7 +165,7 @@ def _marker(
 
 
 def _parcels() -> list[_Rule]:
-    irregular = "\"sides\" <> 3 AND \"irregularity\" > "
+    irregular = '"sides" <> 3 AND "irregularity" > '
     return [
         _Rule("Triangle", '"sides" = 3', [_fill(_TRIANGLE)], "fill"),
         _Rule("Irregularity above 0.4", irregular + "0.4", [_fill(_REDS[2])], "fill"),

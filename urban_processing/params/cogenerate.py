@@ -65,8 +65,8 @@ class CogenerateParams(Params):
     simplify: Annotated[
         float | None,
         Param(
-            help="Tolerance of the simplification of the boundary; by default a quarter of the "
-            "side of the smallest parcel, 0 keeps every vertex.",
+            help="Tolerance of the simplification of the boundary; by default 0.3 of the side "
+            "of the smallest parcel; 0 keeps every vertex.",
             unit="m",
             minimum=0,
             group=_SIZE,
@@ -257,7 +257,7 @@ class Rules:
 
 RULES: dict[Preset, Rules] = {
     Preset.RECOMMENDED: Rules(
-        weights=(0.3, 0.6, 0.1),
+        weights=(0.3, 0.9, 0.1),
         size_cap=0.7,
         continuity=0.05,
         clearance=0.4,

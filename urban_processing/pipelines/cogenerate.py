@@ -149,7 +149,9 @@ def smallest_area(site: Site, params: CogenerateParams) -> float:
 def begin(site: Site, params: CogenerateParams) -> State:
     """The state before the first level: one parcel a part, cut through its holes."""
     min_area = smallest_area(site, params)
-    tolerance = default_tolerance(min_area) if params.simplify is None else params.simplify
+    tolerance = params.simplify
+    if tolerance is None:
+        tolerance = default_tolerance(site.area / params.parcels / MEAN_OVER_MIN if params.parcels else min_area)
     layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
     quota = None if params.parcels is None else _shared_out(layout.mesh.face_area, params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)

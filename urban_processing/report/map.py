@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,16 +13,33 @@ import numpy.typing as npt
 import shapely
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
 from matplotlib.path import Path as Outline
-from matplotlib.patheffects import Normal, withStroke
 
 from urban_processing.errors import OutputError, ParameterError
 from urban_processing.layout import Layout
 from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.report.legend import (
+    draw_colour_bar,
+    draw_legend,
+    draw_scale_bar,
+    legend_entries,
+    root_figure,
+)
+from urban_processing.report.palette import (
+    CASING,
+    FAINT,
+    INK,
+    OUTLINE,
+    PLAIN_CASING,
+    PLAIN_STREET,
+    STREET,
+    VALUE_RAMP,
+    Scale,
+    parcel_colours,
+    text_points,
+)
 from urban_processing.schema import PARCELS, ColumnType
 
 if TYPE_CHECKING:
@@ -34,26 +50,9 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of files that a map can be written to."""
 
-IRREGULAR = 0.1
-"""Parcels with a larger irregularity are tinted (Chen 2024, Fig. 17)."""
-
-STRONGLY_IRREGULAR = 0.5
-"""Irregularity from which the tint has its full strength."""
-
 DOTS_PER_INCH = 200
 
-FloatArray = npt.NDArray[np.float64]
-
-_INK, _FAINT = "#4a463f", "#8c8579"
-_PARCEL, _OUTLINE = "#f6f4ee", "#aaa396"
-_TRIANGLE = "#b6a0d6"
-_IRREGULAR_RAMP = LinearSegmentedColormap.from_list("irregular", ["#f9dcd0", "#ee8f76", "#d0342c"])
-_VALUE_RAMP = LinearSegmentedColormap.from_list(
-    "value", ["#f7f3dc", "#b9dcc0", "#63b3bd", "#2f7aa8", "#2b4a86"]
-)
-_STREET, _CASING = "#ffcc46", "#8a6b1f"
-_PLAIN_STREET, _PLAIN_CASING = "#ffffff", "#8c8579"
-_REPRODUCIBLE = {"svg.hashsalt": "urban_processing", "svg.fonttype": "path"}
+_REPRODUCIBLE: dict[Any, Any] = {"svg.hashsalt": "urban_processing", "svg.fonttype": "path"}
 _NO_DATES: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None},
@@ -68,44 +67,6 @@ class MapFigure(Figure):
         buffer = io.BytesIO()
         self.savefig(buffer, format="png", dpi=DOTS_PER_INCH / 2)
         return buffer.getvalue()
-
-
-@dataclass(frozen=True)
-class _Scale:
-    """Sizes on paper.
-
-    Parameters
-    ----------
-    points_per_metre
-        Of paper and of ground.
-    side
-        Typical side of a parcel in metres.
-    text
-        Size of letters in points.
-    """
-
-    points_per_metre: float
-    side: float
-    text: float
-
-    @property
-    def parcel_points(self) -> float:
-        return self.side * self.points_per_metre
-
-    @property
-    def outline(self) -> float:
-        return float(np.clip(0.025 * self.parcel_points, 0.12, 0.6))
-
-    @property
-    def casing(self) -> float:
-        return float(np.clip(0.035 * self.parcel_points, 0.2, 0.7))
-
-    def street(self, width_m: FloatArray) -> FloatArray:
-        """Line widths in points: true to scale within what reads well beside parcels."""
-        shown = np.clip(width_m, 0.11 * self.side, 0.2 * self.side)
-        # classes stay apart where all true widths are out of range
-        shown = shown * np.clip(width_m / np.median(width_m), 0.8, 1.25) ** 0.5
-        return np.asarray(np.maximum(shown * self.points_per_metre, 0.45))
 
 
 def plot_layout(
@@ -153,13 +114,10 @@ def plot_layout(
     _check_colour_by(colour_by)
     target = None if path is None else _checked(Path(path))
     tables = layout_tables(layout) if isinstance(layout, Layout) else layout.tables
-    figure = None
     if ax is None:
-        figure, ax = _new_axes(tables, title, size)
+        ax = _new_axes(tables, title, size)
+    figure = root_figure(ax)
     _draw(ax, tables, colour_by)
-    figure = ax.get_figure(root=True) if figure is None else figure
-    if figure is None:
-        raise ParameterError("ax belongs to no figure.")
     if target is not None:
         _save(figure, target)
     return figure
@@ -202,14 +160,12 @@ def _save(figure: Figure, path: Path) -> None:
         raise OutputError(f"The map {path} cannot be written: {error.strerror}.") from error
 
 
-def _new_axes(
-    tables: dict[str, Table], title: str, size: float | None
-) -> tuple[Figure, Axes]:
-    """A figure in the shape of the land, with strips for the title and the legend."""
+def _new_axes(tables: dict[str, Table], title: str, size: float | None) -> Axes:
+    """Make a figure in the shape of the land, with strips for the title and the legend."""
     x0, y0, x1, y1 = _extent(tables)
     longer = _longer_side(tables) if size is None else size
     factor = longer / max(x1 - x0, y1 - y0)
-    text = _text_points(longer) / 8
+    text = text_points(longer) / 8
     margin, head, foot = 0.2, 0.4 * text if title else 0.0, 0.42 * text
     width = max(factor * (x1 - x0), 5.5) + 2 * margin
     height = factor * (y1 - y0) + 2 * margin + head + foot
@@ -231,9 +187,9 @@ def _new_axes(
             va="top",
             size=13 * text,
             weight="bold",
-            color=_INK,
+            color=INK,
         )
-    return figure, ax
+    return ax
 
 
 def _longer_side(tables: dict[str, Table]) -> float:
@@ -242,10 +198,6 @@ def _longer_side(tables: dict[str, Table]) -> float:
     land = float(tables["boundary"]["area_m2"].sum())
     spread = min((x1 - x0) * (y1 - y0) / land, 6.0)
     return float(np.clip(0.15 * (len(tables["parcels"]) * spread) ** 0.5 + 5.5, 7.0, 22.0))
-
-
-def _text_points(longer: float) -> float:
-    return float(np.clip(0.75 * longer, 8.0, 13.0))
 
 
 def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
@@ -258,12 +210,12 @@ def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
     scale = _scale(ax, tables)
     _draw_parcels(ax, tables["parcels"], scale, colour_by)
     _draw_rim(ax, tables["boundary"], scale)
-    colours = (_STREET, _CASING) if colour_by is None else (_PLAIN_STREET, _PLAIN_CASING)
+    colours = (STREET, CASING) if colour_by is None else (PLAIN_STREET, PLAIN_CASING)
     _draw_streets(ax, tables["streets"], tables["junctions"], scale, colours)
-    _draw_scale_bar(ax, scale)
-    _draw_legend(ax, _legend_entries(tables, colour_by, colours), scale)
+    draw_scale_bar(ax, scale)
+    draw_legend(ax, legend_entries(tables, colour_by, colours), scale)
     if colour_by is not None:
-        _draw_colour_bar(ax, colour_by, scale)
+        draw_colour_bar(ax, colour_by, scale)
 
 
 def _extent(tables: dict[str, Table]) -> tuple[float, float, float, float]:
@@ -271,25 +223,25 @@ def _extent(tables: dict[str, Table]) -> tuple[float, float, float, float]:
     return float(x0), float(y0), float(x1), float(y1)
 
 
-def _scale(ax: Axes, tables: dict[str, Table]) -> _Scale:
+def _scale(ax: Axes, tables: dict[str, Table]) -> Scale:
     """Points on paper for each metre on the ground, at equal aspect."""
-    figure = ax.get_figure(root=True)
-    x0, y0, x1, y1 = ax.get_window_extent().extents * (72 / figure.dpi if figure else 1.0)
+    box = ax.get_window_extent()
+    width, height = box.width * 72 / root_figure(ax).dpi, box.height * 72 / root_figure(ax).dpi
     left, right = ax.get_xlim()
     bottom, top = ax.get_ylim()
-    points = min((x1 - x0) / (right - left), (y1 - y0) / (top - bottom))
+    points = min(width / (right - left), height / (top - bottom))
     side = float(np.sqrt(np.median(tables["parcels"]["area_m2"])))
-    return _Scale(points, side, _text_points(max(x1 - x0, y1 - y0) / 72))
+    return Scale(points, side, text_points(max(width, height) / 72))
 
 
-def _draw_rim(ax: Axes, boundary: Table, scale: _Scale) -> None:
-    """The land's outline and its holes, where no street covers them."""
+def _draw_rim(ax: Axes, boundary: Table, scale: Scale) -> None:
+    """Draw the land's outline and its holes, where no street covers them."""
     outlines = [_outline(polygon) for polygon in _polygons(boundary)]
     ax.add_collection(
         PathCollection(
             outlines,
             facecolors="none",
-            edgecolors=_FAINT,
+            edgecolors=FAINT,
             linewidths=1.8 * scale.outline,
             joinstyle="round",
             zorder=1.5,
@@ -302,18 +254,18 @@ def _polygons(table: Table) -> npt.NDArray[np.object_]:
     return np.asarray(parts, dtype=object)
 
 
-def _draw_parcels(ax: Axes, parcels: Table, scale: _Scale, colour_by: str | None) -> None:
+def _draw_parcels(ax: Axes, parcels: Table, scale: Scale, colour_by: str | None) -> None:
     collection = PathCollection(
         [_outline(polygon) for polygon in _geometry(parcels)],
-        facecolors=_parcel_colours(parcels),
-        edgecolors=_OUTLINE,
+        facecolors=parcel_colours(parcels),
+        edgecolors=OUTLINE,
         linewidths=scale.outline,
         joinstyle="round",
         zorder=1,
     )
     if colour_by is not None:
         collection.set_array(np.asarray(parcels[colour_by], dtype=np.float64))
-        collection.set_cmap(_VALUE_RAMP)
+        collection.set_cmap(VALUE_RAMP)
         collection.set_norm(_value_range(parcels[colour_by]))
     ax.add_collection(collection)
 
@@ -328,16 +280,6 @@ def _value_range(values: npt.NDArray[Any]) -> Normalize:
     return Normalize(low, high if high > low else low + 1.0)
 
 
-def _parcel_colours(parcels: Table) -> FloatArray:
-    colours = np.tile(to_rgb(_PARCEL), (len(parcels), 1))
-    irregularity = parcels["irregularity"]
-    irregular = irregularity > IRREGULAR
-    strength = (irregularity[irregular] - IRREGULAR) / (STRONGLY_IRREGULAR - IRREGULAR)
-    colours[irregular] = _IRREGULAR_RAMP(np.clip(strength, 0, 1))[:, :3]
-    colours[parcels["sides"] == 3] = to_rgb(_TRIANGLE)
-    return colours
-
-
 def _outline(polygon: shapely.Polygon) -> Outline:
     rings = [polygon.exterior, *polygon.interiors]
     paths = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings]
@@ -345,7 +287,7 @@ def _outline(polygon: shapely.Polygon) -> Outline:
 
 
 def _draw_streets(
-    ax: Axes, streets: Table, junctions: Table, scale: _Scale, colours: tuple[str, str]
+    ax: Axes, streets: Table, junctions: Table, scale: Scale, colours: tuple[str, str]
 ) -> None:
     """All casings below all fills, so that crossings are open."""
     lines = [shapely.get_coordinates(line) for line in _geometry(streets)]
@@ -366,7 +308,7 @@ def _draw_streets(
             )
         )
         size = 2.0 * float(np.median(width)) + margin
-        ax.scatter(*ends.T, s=size**2, c=colour, linewidths=0, zorder=zorder)
+        ax.scatter(ends[:, 0], ends[:, 1], s=size**2, c=colour, linewidths=0, zorder=zorder)
 
 
 def _geometry(table: Table) -> npt.NDArray[np.object_]:

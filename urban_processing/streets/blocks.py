@@ -13,7 +13,7 @@ SMALL_BLOCK = 5
 LARGEST_BLOCK = 20
 """Number of parcels above which a block is split, and up to which blocks are merged."""
 
-THROUGH_COST = 0.5
+THROUGH_COST = 0.2
 """Cost of each parcel side of street that lies opposite another street of the same parcel."""
 
 PARALLEL = 0.8

@@ -11,7 +11,7 @@ from urban_processing.streets.state import StreetState
 JOIN_COST = 0.5
 """Cost of a new T-junction, and of a bend where a dead end is met sideways, in turns."""
 
-JOG_COST = 0.5
+JOG_COST = 1.0
 """Cost of a junction within `JOG_DISTANCE` of another on the same street, in turns."""
 
 JOG_DISTANCE = 0.6

@@ -1,0 +1,134 @@
+"""What stands below a map: scale bar, legend and colour bar."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import Normal, withStroke
+
+from urban_processing.errors import ParameterError
+from urban_processing.metrics.measures import IRREGULAR
+from urban_processing.metrics.tables import Table
+from urban_processing.report.palette import FAINT, INK, IRREGULAR_RAMP, PARCEL, TRIANGLE, Scale
+from urban_processing.schema import PARCELS
+
+
+def root_figure(ax: Axes) -> Figure:
+    """Return the figure that axes belong to.
+
+    Raises
+    ------
+    ParameterError
+        If they were taken out of their figure.
+    """
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise ParameterError("ax belongs to no figure.")
+    return figure
+
+
+def draw_scale_bar(ax: Axes, scale: Scale) -> None:
+    """Draw a bar of a round length below the left corner of the map."""
+    left, right = ax.get_xlim()
+    length = _round_length(0.22 * (right - left))
+    label = f"{length / 1000:g} km" if length >= 1000 else f"{length:g} m"
+    share, inch = length / (right - left), 1.0 / _height_inches(ax)
+    below = -0.02 * scale.text * inch
+    for start, colour in ((0.0, INK), (share / 2, "white")):
+        ax.add_patch(
+            Rectangle(
+                (start, below),
+                share / 2,
+                0.05 * inch,
+                facecolor=colour,
+                edgecolor=INK,
+                linewidth=0.7,
+                transform=ax.transAxes,
+                clip_on=False,
+            )
+        )
+    ax.text(
+        share / 2,
+        below - 0.05 * inch,
+        label,
+        transform=ax.transAxes,
+        ha="center",
+        va="top",
+        size=scale.text,
+        color=INK,
+    )
+
+
+def _round_length(length: float) -> float:
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(max(step for step in (1.0, 2.0, 5.0) if step * power <= length) * power)
+
+
+def _height_inches(ax: Axes) -> float:
+    return float(ax.get_window_extent().height / root_figure(ax).dpi)
+
+
+def legend_entries(
+    tables: dict[str, Table], colour_by: str | None, colours: tuple[str, str]
+) -> list[Patch | Line2D]:
+    """Return what the map shows, with numbers; `colours` are those of streets."""
+    parcels = tables["parcels"]
+    triangle = parcels["sides"] == 3
+    irregular = (parcels["irregularity"] > IRREGULAR) & ~triangle
+    n_ends = int((tables["junctions"]["kind"] == "end").sum())
+    street, casing = colours
+    entries: list[Patch | Line2D] = []
+    if colour_by is None:
+        entries.append(_swatch(PARCEL, _counted(len(parcels), "parcel")))
+        if irregular.any():
+            entries.append(_swatch(IRREGULAR_RAMP(0.6), f"{int(irregular.sum()):,} irregular"))
+        if triangle.any():
+            entries.append(_swatch(TRIANGLE, _counted(int(triangle.sum()), "triangle")))
+    cased = [withStroke(linewidth=4.4, foreground=casing), Normal()]
+    entries.append(Line2D([], [], color=street, lw=3, label="Street", path_effects=cased))
+    if n_ends:
+        dot = Line2D([], [], color=street, marker="o", markeredgecolor=casing, ls="", ms=5)
+        dot.set_label(_counted(n_ends, "street end"))
+        entries.append(dot)
+    return entries
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+
+
+def draw_legend(ax: Axes, entries: list[Patch | Line2D], scale: Scale) -> None:
+    """Draw one line of entries below the right corner of the map."""
+    ax.legend(
+        handles=entries,
+        loc="upper right",
+        bbox_to_anchor=(1.0, -0.005 * scale.text / _height_inches(ax)),
+        ncols=len(entries),
+        frameon=False,
+        fontsize=scale.text,
+        labelcolor=INK,
+        handlelength=1.3,
+        columnspacing=1.4,
+        borderaxespad=0.0,
+    )
+
+
+def _swatch(colour: Any, label: str) -> Patch:
+    return Patch(facecolor=colour, edgecolor=FAINT, linewidth=0.6, label=label)
+
+
+def draw_colour_bar(ax: Axes, colour_by: str, scale: Scale) -> None:
+    """Draw the ramp of the values of a parcels' column below the map."""
+    column = PARCELS.column(colour_by)
+    height = _height_inches(ax)
+    inset = ax.inset_axes((0.38, -0.033 * scale.text / height, 0.3, 0.1 / height))
+    bar = root_figure(ax).colorbar(ax.collections[0], cax=inset, orientation="horizontal")
+    bar.outline.set_linewidth(0.4)
+    label = f"{column.alias} [{column.unit}]" if column.unit else column.alias
+    inset.tick_params(labelsize=0.85 * scale.text, length=2, colors=INK)
+    inset.set_title(label, size=scale.text, color=INK, pad=3)
