@@ -10,7 +10,6 @@ from urban_processing.errors import BoundaryError, ParameterError, UrbanError
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.features import Source
 from urban_processing.io.frames import GeoLayout
-from urban_processing.io.rebuild import canonical
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.progress import SILENT, Progress
@@ -76,7 +75,7 @@ def cogenerate(
         errors.append(error)
     if params is None or site is None:
         raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
-    return GeoLayout(canonical(pipeline.cogenerate(site, params, progress)))
+    return GeoLayout(pipeline.cogenerate(site, params, progress))
 
 
 def _site(boundary: Source | Site, **options: Any) -> Site:

@@ -17,6 +17,9 @@ SIMPLIFY_SHARE = 0.3
 """Default tolerance of the simplification, in sides of the smallest parcel: notches that are
 smaller than a parcel make parcels that nobody wants."""
 
+MOVED_SHARE = 0.05
+"""Simplification may move this share of a part's area; strips and small parts need less."""
+
 
 def default_tolerance(min_area: float) -> float:
     """Tolerance in metres of the simplification of a boundary for parcels of `min_area` m²."""
@@ -43,7 +46,7 @@ def simplify_site(site: Site, tolerance: float) -> Site:
     issue = Issue(
         code="boundary_simplified",
         message=(
-            f"The boundary was simplified by {tolerance:.3g} m, from {before} to {after} vertices; "
+            f"The boundary was simplified by up to {tolerance:.3g} m, from {before} to {after} vertices; "
             f"{moved:.0f} m² ({100 * moved / site.area:.2g} %) of land changed sides. "
             "simplify=0 keeps every vertex."
         ),
@@ -54,6 +57,16 @@ def simplify_site(site: Site, tolerance: float) -> Site:
 
 
 def _simplified(part: shapely.Polygon, tolerance: float) -> shapely.Polygon:
+    """Simplify a part; where too much land would change sides, by a smaller tolerance."""
+    while tolerance > 1e-3 * np.sqrt(part.area):
+        simple = _simplified_once(part, tolerance)
+        if shapely.symmetric_difference(part, simple).area <= MOVED_SHARE * part.area:
+            return simple
+        tolerance /= 2
+    return part
+
+
+def _simplified_once(part: shapely.Polygon, tolerance: float) -> shapely.Polygon:
     rings = [_from_sharpest(ring) for ring in (part.exterior, *part.interiors)]
     start = shapely.Polygon(rings[0], rings[1:])
     simple = shapely.simplify(start, tolerance, preserve_topology=True)

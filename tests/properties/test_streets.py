@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -54,7 +54,8 @@ def bisect(layout: Layout, rng: np.random.Generator) -> Layout:
         ring = editor.ring(int(layout.mesh.face_half_edges(face)[0]))
         _cut(editor, ring, middle, normal)
     mesh, remap = editor.commit()
-    mesh.validate()
+    # a cut straight across a bent parcel may leave it
+    assume((mesh.face_area > 0).all() and shapely.is_valid(mesh.face_polygons()).all())
     return layout.with_mesh(mesh, remap)
 
 
@@ -119,6 +120,14 @@ def street_degree(layout: Layout) -> np.ndarray:
     ).astype(int)
 
 
+def loose_ends(layout: Layout) -> np.ndarray:
+    """(V,) dead ends, but for those at a hole, which no street can go round."""
+    mesh = layout.mesh
+    at_hole = np.zeros(mesh.n_vertices, dtype=bool)
+    at_hole[mesh.origin[np.repeat(layout.edge_kind == EdgeKind.HOLE, 2)]] = True
+    return (street_degree(layout) == 1) & ~at_hole
+
+
 def n_components(layout: Layout) -> int:
     """Return the number of connected components of the streets."""
     mesh = layout.mesh
@@ -136,7 +145,7 @@ def interior_length(layout: Layout) -> float:
 
 
 @pytest.mark.parametrize("land", sorted(LANDS))
-@settings(max_examples=5, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 10_000), preset=st.sampled_from(list(Preset)))
 def test_loops_reach_every_parcel_without_dead_ends(land: str, seed: int, preset: Preset) -> None:
     """All parcels reached, one component and no dead end after every level."""
@@ -144,18 +153,18 @@ def test_loops_reach_every_parcel_without_dead_ends(land: str, seed: int, preset
     for layout in layouts(land, 7, seed, params, keep_ends=False):
         assert is_reached(layout.frontage, layout.mesh.face_area).all()
         assert n_components(layout) == 1
-        assert not (street_degree(layout) == 1).any()
+        assert not loose_ends(layout).any()
         assert not (layout.edge_street & (layout.edge_kind == EdgeKind.HOLE)).any()
         assert ((layout.edge_level >= 0) == layout.edge_street).all()
     pruned = prune_streets(layout, params, keep_ends=False)
     assert is_reached(pruned.frontage, pruned.mesh.face_area).all()
     assert n_components(pruned) == 1
-    assert not (street_degree(pruned) == 1).any()
+    assert not loose_ends(pruned).any()
     assert interior_length(pruned) <= interior_length(layout)
 
 
 @pytest.mark.parametrize("land", sorted(LANDS))
-@settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=5, deadline=None, suppress_health_check=list(HealthCheck))
 @given(seed=st.integers(0, 10_000), preset=st.sampled_from(list(Preset)))
 def test_trees_are_connected_and_every_dead_end_is_needed(
     land: str, seed: int, preset: Preset

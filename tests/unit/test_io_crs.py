@@ -46,9 +46,7 @@ def test_metric_and_true_crs_is_kept(code: int, lon: float, lat: float) -> None:
         (32630, 10.0, 50.0, "EPSG:32632", "distorts"),
     ],
 )
-def test_unfit_crs_becomes_utm(
-    code: int, lon: float, lat: float, expected: str, word: str
-) -> None:
+def test_unfit_crs_becomes_utm(code: int, lon: float, lat: float, expected: str, word: str) -> None:
     chosen = choose(code, lon, lat)
     assert rules.crs_text(chosen.crs) == expected
     assert word in chosen.reason

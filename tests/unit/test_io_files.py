@@ -22,7 +22,7 @@ from urban_processing.io import files
 from urban_processing.io.exports import check_export, export_layout
 from urban_processing.io.files import check_output, read_layout, timeless, write_layout
 from urban_processing.io.frames import GeoLayout
-from urban_processing.io.rebuild import canonical
+from urban_processing.rebuild import canonical
 from urban_processing.layout import Layout, Step
 from urban_processing.metrics.tables import Table, layout_tables
 from urban_processing.schema import LAYERS, GeometryType
@@ -303,7 +303,9 @@ def test_exports(layout: Layout, tmp_path: Path) -> None:
     assert shapely.hausdorff_distance(back.values, geo.parcels.geometry.values).max() < 1e-3
     assert len(gpd.read_file(folder / "issues.geojson")) == 3
     assert (folder / "metrics.csv").read_text().startswith("part,metric,value,unit")
-    columns = gpd.read_parquet(export_layout(layout, tmp_path / "p", kind="parquet") / "parcels.parquet")
+    columns = gpd.read_parquet(
+        export_layout(layout, tmp_path / "p", kind="parquet") / "parcels.parquet"
+    )
     assert columns.crs == "EPSG:32630"
     assert columns.geometry.geom_equals(geo.parcels.geometry.reset_index(drop=True)).all()
     assert sorted(p.stem for p in (tmp_path / "p").iterdir()) == sorted(geo.tables)

@@ -24,7 +24,9 @@ def layout() -> Layout:
     return grid(6, 4, [(3, 0), (3, 2)])
 
 
-@pytest.mark.parametrize(("suffix", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+@pytest.mark.parametrize(
+    ("suffix", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+)
 def test_same_layout_gives_same_file(
     layout: Layout, tmp_path: Path, suffix: str, start: bytes
 ) -> None:
@@ -89,9 +91,9 @@ def test_nothing_of_the_caller_is_touched(layout: Layout, tmp_path: Path) -> Non
     assert dict(mpl.rcParams) == before
     import sys
 
-    assert "matplotlib.pyplot" not in sys.modules or not sys.modules[
-        "matplotlib.pyplot"
-    ].get_fignums()
+    assert (
+        "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+    )
 
 
 def test_notebooks_show_the_figure(layout: Layout) -> None:

@@ -141,9 +141,7 @@ def test_group_too_large_for_one_access_is_reached_by_several() -> None:
     assert not (degrees(layout) == 1).any()
 
 
-def brute_force(
-    state: StreetState, starts: list[tuple[float, int]], blocked: set[int]
-) -> float:
+def brute_force(state: StreetState, starts: list[tuple[float, int]], blocked: set[int]) -> float:
     """Cost of the cheapest of all paths."""
     best = math.inf
 
@@ -343,3 +341,16 @@ def test_locked_parcels_need_no_access() -> None:
     inner = {5, 6, 9, 10}
     layout = make_layout(boxes(4, 4), locked=inner)
     assert extend_streets(layout, PARAMS, level=1, keep_ends=False) is layout
+
+
+def test_bridge_between_two_blocks_at_a_bare_rim_stays() -> None:
+    # two streets from rim to rim and one that connects them: parcels on its two sides are
+    # reached without it and lie in different blocks, yet it holds the network together
+    layout = make_layout(boxes(3, 4), rim=False)
+    state = StreetState(layout, PARAMS)
+    for x in (10, 20):
+        lay(state, *((x, y) for y in (0, 10, 20, 30, 40)))
+    lay(state, (10, 20), (20, 20))
+    pruned = prune_streets(state.finish(level=1), PARAMS, keep_ends=True)
+    assert StreetState(pruned, PARAMS).network_components()[0] == 1
+    assert reached(pruned).all()

@@ -173,8 +173,14 @@ _LOCAL_NAME = "Local Lambert azimuthal equal-area"
 
 
 def _geodetic(crs: pyproj.CRS) -> pyproj.CRS:
+    """Return longitude and latitude in degrees on the datum of a CRS."""
     base = crs.geodetic_crs
-    return WGS84 if base is None else GeographicCRS(datum=base.datum)
+    if base is None:
+        return WGS84
+    axes = base.axis_info
+    if base.is_geographic and len(axes) == 2 and axes[0].unit_name == "degree":
+        return base
+    return GeographicCRS(datum=base.datum)
 
 
 def _why_not(crs: pyproj.CRS, lon_lat: FloatArray) -> str:

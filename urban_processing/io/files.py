@@ -21,7 +21,7 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldE
 
 from urban_processing.errors import BoundaryError, OutputError, TopologyError
 from urban_processing.io.geopackage import read_state, write_geopackage
-from urban_processing.io.rebuild import LayoutParts, canonical, rebuild_layout
+from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.layout import Layout, Step
 from urban_processing.metrics.tables import layout_tables
 from urban_processing.schema import ISSUES, PARCELS, PROVENANCE, STREETS
@@ -155,7 +155,11 @@ def read_layout(path: str | PathLike[str]) -> GeoLayout:
     except (DataSourceError, DataLayerError, KeyError, ValueError) as error:
         raise BoundaryError(f"{source} is damaged or was changed: {error}") from error
     return GeoLayout(
-        layout.replace(history=_read_history(source), input_parts=_read_input(source, frame))
+        layout.replace(
+            corners_given=state["corners_given"],
+            history=_read_history(source),
+            input_parts=_read_input(source, frame),
+        )
     )
 
 
@@ -180,6 +184,7 @@ def _state(layout: Layout) -> str:
             "origin": list(layout.frame.origin),
             "min_area": layout.min_area,
             "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
+            "corners_given": layout.corners_given,
         }
     )
 

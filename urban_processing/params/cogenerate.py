@@ -231,6 +231,8 @@ class Rules:
         Default weight of continuing a neighbour's cut (Yang 2013, section 5).
     clearance
         Penalty on cuts that run close to the boundary: they leave slivers at notches.
+    variation
+        Size of a random addition to the quality of cuts: seeds choose among near equals.
     prospect
         Weight of the parcels that later cuts can make of a half, in rating its proportions;
         0 rates the half's own proportions.
@@ -248,6 +250,7 @@ class Rules:
     size_cap: float
     continuity: float
     clearance: float
+    variation: float
     prospect: float
     aligned_seeds: bool
     snap: float
@@ -261,6 +264,7 @@ RULES: dict[Preset, Rules] = {
         size_cap=0.7,
         continuity=0.05,
         clearance=0.4,
+        variation=0.01,
         prospect=6.0,
         aligned_seeds=True,
         snap=0.08,
@@ -272,6 +276,7 @@ RULES: dict[Preset, Rules] = {
         size_cap=1.0,
         continuity=0.0,
         clearance=0.0,
+        variation=0.0,
         prospect=0.0,
         aligned_seeds=False,
         snap=0.0,

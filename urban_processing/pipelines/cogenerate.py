@@ -14,6 +14,7 @@ from urban_processing.layout import Layout, Step
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.progress import SILENT, Progress
+from urban_processing.rebuild import canonical
 from urban_processing.site import Issue, Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
@@ -111,7 +112,7 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         done = math.log2(state.layout.mesh.n_faces + 1) / math.log2(goal + 2)
         progress.update(min(done, 1.0) ** 3, _message(state))
         state = step(state)
-    layout = finish(state)
+    layout = canonical(finish(state))
     progress.update(1.0, _message(state))
     entry = Step(
         algorithm="cogenerate",
@@ -151,7 +152,8 @@ def begin(site: Site, params: CogenerateParams) -> State:
     min_area = smallest_area(site, params)
     tolerance = params.simplify
     if tolerance is None:
-        tolerance = default_tolerance(site.area / params.parcels / MEAN_OVER_MIN if params.parcels else min_area)
+        mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
+        tolerance = default_tolerance(mean / MEAN_OVER_MIN)
     layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
     quota = None if params.parcels is None else _shared_out(layout.mesh.face_area, params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)

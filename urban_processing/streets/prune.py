@@ -36,38 +36,58 @@ def prune_streets(layout: Layout, params: CogenerateParams, *, keep_ends: bool) 
 def prune_links(state: StreetState) -> None:
     """Take back street links between two blocks that may become one.
 
-    A link with the same block on both sides is a bridge of the network and stays; taking
+    A link with the same region on both sides is a bridge of the network and stays; taking
     back any other keeps the network connected. Links end at junctions of three streets and
     more, so none leaves a dead end.
     """
-    block: list[int] = state.blocks().tolist()
-    members = [0] * len(block)
-    for b in block:
-        members[b] += 1
-    merged = list(range(len(block)))
-
-    def block_of(face: int) -> int:
-        b = block[face]
-        while merged[b] != b:
-            b = merged[b]
-        return b
-
+    blocks = _Merged(state.blocks().tolist())
+    regions = _Merged(state.regions().tolist())
     while True:
         links = sorted((-link_cost(state, link), link) for link in street_links(state))
         removed = False
         for loss, link in links:
             if loss >= 0.0:
                 break
-            a = block_of(state.face[link[0]])
-            b = block_of(state.face[link[0] ^ 1])
-            if a == b or members[a] + members[b] > LARGEST_BLOCK:
+            left, right = state.face[link[0]], state.face[link[0] ^ 1]
+            if regions.same(left, right) or blocks.members(left, right) > LARGEST_BLOCK:
                 continue
             if not stands_free(state, link) or not is_spare(state, link):
                 continue
             for i in link:
                 state.remove(i)
-            merged[b] = a
-            members[a] += members[b]
+            blocks.merge(left, right)
+            regions.merge(left, right)
             removed = True
         if not removed:
             return
+
+
+class _Merged:
+    """Sets of parcels that are merged one by one (union-find)."""
+
+    def __init__(self, label: list[int]) -> None:
+        self._label = label
+        self._parent = list(range(max(label) + 1))
+        self._members = [0] * len(self._parent)
+        for k in label:
+            self._members[k] += 1
+
+    def _root(self, parcel: int) -> int:
+        k = self._label[parcel]
+        while self._parent[k] != k:
+            k = self._parent[k]
+        return k
+
+    def same(self, a: int, b: int) -> bool:
+        return self._root(a) == self._root(b)
+
+    def members(self, a: int, b: int) -> int:
+        """Count the parcels of both sets together."""
+        a, b = self._root(a), self._root(b)
+        return self._members[a] + (self._members[b] if a != b else 0)
+
+    def merge(self, a: int, b: int) -> None:
+        a, b = self._root(a), self._root(b)
+        if a != b:
+            self._parent[b] = a
+            self._members[a] += self._members[b]

@@ -148,6 +148,22 @@ class StreetState:
         _, label = connected_components(links, directed=False)
         return np.asarray(label, dtype=np.int64)
 
+    def regions(self) -> IntArray:
+        """(F,) what the streets enclose together, if one could cross rims that are no street.
+
+        The faces of the street network as a planar graph: a street with the same region on
+        both sides is a bridge of the network. Blocks are the same where all rims are streets.
+        """
+        graph, mesh = self.graph, self.layout.mesh
+        loop = mesh.loops.of_half_edge[graph.half_edges[graph.offsets[:-1]]]
+        n = mesh.n_faces + len(mesh.loops.face)
+        side = np.where(graph.face == OUTSIDE, mesh.n_faces + loop, graph.face)
+        open_ = ~self.street_mask()[0::2]
+        left, right = side[0::2][open_], side[1::2][open_]
+        links = coo_matrix((np.ones(len(left)), (left, right)), shape=(n, n))
+        _, label = connected_components(links, directed=False)
+        return np.asarray(label[: mesh.n_faces], dtype=np.int64)
+
     def finish(self, *, level: int) -> Layout:
         """Return the layout with the streets as they are now."""
         layout = self.layout

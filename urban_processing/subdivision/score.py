@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.fields.rings import ComplexArray, cross
+from urban_processing.hashing import UintArray, uniform
 from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS, STRAIGHT_ANGLE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
@@ -25,6 +26,9 @@ better one is kept."""
 QUOTA_WEIGHT = 2.0
 """Weight, relative to λ1, of parcels of equal size where their number is given."""
 
+
+BEYOND_CAP = 0.1
+"""Share of Qsize that still tells equal halves from those at the cap."""
 
 OWN_SHARE = 0.2
 """Weight of the present proportions of a half that is still to be cut."""
@@ -54,6 +58,7 @@ def score_cuts(
     *,
     min_share: FloatArray,
     quota: IntArray,
+    lineage: UintArray,
     params: CogenerateParams,
     snap: float,
 ) -> ScoredCuts:
@@ -65,6 +70,8 @@ def score_cuts(
         (B,) smallest allowed share of a parcel's area in either half.
     quota
         (B,) number of parcels that a parcel is to become; 0 where there is no such number.
+    lineage
+        (B,) path of each parcel, which seeds its random numbers.
     snap
         Distance along the ring, in √area, within which an end moves to a mesh corner.
     """
@@ -95,7 +102,7 @@ def score_cuts(
             right.with_prospect(total[1], parcel_quota - left_quota, rules.prospect),
         ]
     quality = (
-        w_size * np.minimum(1.0, smaller / larger / rules.size_cap)
+        w_size * _balance(smaller / larger, rules.size_cap)
         + w_shape / (1.0 + shape[0] + shape[1])
         + w_access * (1.0 + reached.all(axis=1))
         - rules.clearance * np.clip(1.0 - cuts.clearance / CLEARANCE, 0.0, 1.0)
@@ -107,6 +114,8 @@ def score_cuts(
         quality += params.continuity * 0.5 * ends
     if params.orientation is not None:
         quality += params.weight_orientation * _oriented(boundary, cuts.parcel, b - a, params.orientation)
+    if rules.variation > 0:
+        quality += rules.variation * _noise(cuts.parcel, lineage, params.seed)
     legal = (smaller >= min_share[cuts.parcel]) & (left.n >= 3) & (right.n >= 3)
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
@@ -114,6 +123,22 @@ def score_cuts(
     return ScoredCuts(
         cuts, t_a, t_b, area, np.column_stack([left.irregularity, right.irregularity]), reached, quality
     )
+
+
+def _noise(parcel: IntArray, lineage: UintArray, seed: int) -> FloatArray:
+    """A random number for each candidate, so that another seed gives another layout."""
+    place = np.empty(len(parcel), dtype=np.int64)
+    order = np.argsort(parcel, kind="stable")
+    start = np.searchsorted(parcel[order], parcel[order])
+    place[order] = np.arange(len(parcel)) - start
+    draws = uniform(seed + 2, lineage, int(place.max(initial=0)) + 1)
+    return np.asarray(draws[parcel, place])
+
+
+def _balance(ratio: FloatArray, cap: float) -> FloatArray:
+    """Qsize of Eq. 2; from the cap on, which is 1 in the paper, it hardly grows."""
+    capped = np.minimum(1.0, ratio / cap)
+    return np.asarray(capped if cap >= 1 else (1 - BEYOND_CAP) * capped + BEYOND_CAP * ratio)
 
 
 def _quota_misfit(area: FloatArray, quota: IntArray) -> FloatArray:

@@ -98,6 +98,7 @@ def propose_cuts(
             cuts,
             min_share=min_area / boundary.rings.scale**2,
             quota=quotas[rows],
+            lineage=parcels.lineage[rows],
             params=params,
             snap=0.0 if thorough else params.rules.snap,
         )

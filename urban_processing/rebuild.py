@@ -65,7 +65,10 @@ def canonical(layout: Layout) -> Layout:
     )
     rebuilt = rebuild_layout(parts, frame=layout.frame, min_area=layout.min_area)
     return rebuilt.replace(
-        issues=layout.issues, history=layout.history, input_parts=layout.input_parts
+        corners_given=layout.corners_given,
+        issues=layout.issues,
+        history=layout.history,
+        input_parts=layout.input_parts,
     )
 
 

@@ -1,0 +1,220 @@
+"""What must hold of every layout, on many lands."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+import shapely.affinity
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lands import LANDS, holed, site_of, star
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.metrics import certificate
+from urban_processing.params import CogenerateParams, StreetPattern
+from urban_processing.pipelines.cogenerate import begin, cogenerate, estimate, step
+from urban_processing.progress import CallbackProgress
+
+FEW = settings(
+    max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+
+
+def run(*polygons: shapely.Polygon, **values: object) -> Layout:
+    return cogenerate(site_of(*polygons), CogenerateParams(**values))
+
+
+def street_ends(layout: Layout) -> int:
+    at = layout.mesh.origin[np.repeat(layout.edge_street, 2)]
+    return int((np.bincount(at) == 1).sum())
+
+
+def must_hold(layout: Layout) -> None:
+    layout.mesh.validate()
+    proof = certificate(layout)
+    assert proof.holds, [(c.name, c.message) for c in proof.failures]
+
+
+@pytest.mark.parametrize("name", sorted(LANDS))
+@pytest.mark.parametrize("pattern", list(StreetPattern))
+@pytest.mark.parametrize("parcels", [2, 9, 60])
+def test_certificate_holds(name: str, pattern: StreetPattern, parcels: int) -> None:
+    layout = run(LANDS[name], parcels=parcels, pattern=pattern)
+    must_hold(layout)
+    if pattern is StreetPattern.LOOP:
+        assert street_ends(layout) == 0
+    assert abs(layout.mesh.n_faces - parcels) <= max(0.03 * parcels, 0)
+
+
+@pytest.mark.parametrize("preset", ["recommended", "chen2024"])
+@pytest.mark.parametrize("name", ["triangle", "ell", "star"])
+def test_smallest_area_is_kept_and_cutting_goes_on(name: str, preset: str) -> None:
+    layout = run(LANDS[name], min_area=900, preset=preset)
+    must_hold(layout)
+    area = layout.mesh.face_area
+    assert area.min() >= 900
+    assert (area > 1800).mean() <= 0.05
+    listed = {i.parcel_id for i in layout.issues if i.code == "parcel_not_cut"}
+    assert {f + 1 for f in np.flatnonzero(area > 2700)} <= listed
+
+
+@FEW
+@given(
+    seed=st.integers(0, 10_000),
+    corners=st.integers(5, 24),
+    low=st.floats(0.25, 0.95),
+    parcels=st.integers(1, 80),
+    pattern=st.sampled_from(list(StreetPattern)),
+    turn=st.floats(0, 360),
+)
+def test_random_lands(
+    seed: int, corners: int, low: float, parcels: int, pattern: StreetPattern, turn: float
+) -> None:
+    land = shapely.affinity.rotate(star(seed, corners, low=low), turn)
+    if not land.is_valid:
+        return
+    layout = run(land, parcels=parcels, pattern=pattern, seed=seed)
+    must_hold(layout)
+    if pattern is StreetPattern.LOOP:
+        assert street_ends(layout) == 0
+
+
+@FEW
+@given(seed=st.integers(0, 1000), holes=st.integers(1, 6), parcels=st.integers(8, 80))
+def test_random_lakes(seed: int, holes: int, parcels: int) -> None:
+    land = holed(seed, holes)
+    if not isinstance(land, shapely.Polygon):
+        return
+    layout = run(land, parcels=parcels, seed=seed)
+    must_hold(layout)
+    assert street_ends(layout) == 0
+
+
+@pytest.mark.parametrize("scale", [0.04, 1.0, 3000.0])
+def test_nothing_assumes_a_scale(scale: float) -> None:
+    land = shapely.affinity.scale(star(5), scale, scale, origin=(0, 0))
+    layout = run(land, parcels=40)
+    must_hold(layout)
+    assert layout.mesh.n_faces == 40
+
+
+def test_same_seed_same_layout_other_seed_another() -> None:
+    first, again = (run(LANDS["star"], parcels=60, seed=4) for _ in range(2))
+    assert np.array_equal(first.mesh.xy, again.mesh.xy)
+    assert np.array_equal(first.edge_street, again.edge_street)
+    assert np.array_equal(first.face_lineage, again.face_lineage)
+    other = run(LANDS["star"], parcels=60, seed=5)
+    assert not np.array_equal(first.mesh.xy, other.mesh.xy)
+
+
+def test_place_and_rotation_do_not_matter() -> None:
+    base = LANDS["star"]
+    quality = []
+    for turn, shift in ((0, 0), (33, 0), (90, 5000), (200, -3e5)):
+        land = shapely.affinity.translate(
+            shapely.affinity.rotate(base, turn, origin=(0, 0)), shift, 2 * shift
+        )
+        layout = run(land, parcels=100, simplify=0)
+        must_hold(layout)
+        area = np.sort(layout.mesh.face_area)
+        quality.append((layout.mesh.n_faces, area[0], area[50], area[-1]))
+    # the grid of coordinates and ties aside, the layouts are the same
+    for other in quality[1:]:
+        assert other == pytest.approx(quality[0], rel=0.12)
+
+
+def test_lineages_are_unique_and_levels_count_cuts() -> None:
+    layout = run(LANDS["ell"], parcels=60)
+    assert len(np.unique(layout.face_lineage)) == layout.mesh.n_faces
+    assert 2.0 ** -layout.face_level.astype(float) @ np.ones(60) == pytest.approx(1.0)
+
+
+def test_parts_are_laid_out_apart_and_small_ones_stay_whole() -> None:
+    parts = (shapely.box(0, 0, 300, 200), shapely.box(400, 0, 500, 100), shapely.box(600, 0, 610, 9))
+    layout = run(*parts, min_area=400)
+    must_hold(layout)
+    assert (np.bincount(layout.face_part) > [50, 8, 0]).all()
+    (small,) = [i for i in layout.issues if i.code == "part_below_min_area"]
+    assert layout.face_part[small.parcel_id - 1] == 2
+
+
+def test_land_smaller_than_one_parcel_is_one_parcel() -> None:
+    layout = run(shapely.box(0, 0, 10, 10), min_area=400)
+    assert layout.mesh.n_faces == 1
+    assert [i.code for i in layout.issues] == ["part_below_min_area"]
+
+
+@pytest.mark.parametrize("pattern", list(StreetPattern))
+def test_without_rim_street_the_first_access_becomes_the_network(pattern: StreetPattern) -> None:
+    site = site_of(LANDS["ellipse"], rim_is_street=False)
+    layout = cogenerate(site, CogenerateParams(parcels=60, pattern=pattern))
+    must_hold(layout)
+    assert not (layout.edge_street & (layout.edge_kind != EdgeKind.INTERIOR)).any()
+
+
+def test_given_corners_shape_the_first_cut() -> None:
+    site = site_of(LANDS["ellipse"])
+    corners = np.array([[300.0, 0], [0, 200], [-300, 0], [0, -200]])
+    layout = cogenerate(
+        dataclasses.replace(site, corners=corners), CogenerateParams(parcels=30, simplify=0)
+    )
+    must_hold(layout)
+    flagged = layout.mesh.xy[layout.vertex_corner]
+    assert len(flagged) == 4
+    assert np.abs(flagged).max(axis=0) == pytest.approx([300, 200])
+
+
+def interior_means(**values: object) -> tuple[float, float]:
+    """Mean irregularity, and mean share of parcels' perimeters that is street."""
+    from urban_processing.metrics import measure
+
+    figures = {
+        m.metric: m.value
+        for m in measure(run(LANDS["star"], parcels=150, **values))
+        if m.part is None
+    }
+    return figures["irregularity_mean"], figures["street_share_pct"]
+
+
+def test_weight_of_regularity_lowers_irregularity() -> None:
+    low, _ = interior_means(weight_regularity=0.05, weight_size=0.3, weight_access=0.2)
+    high, _ = interior_means(weight_regularity=2.0, weight_size=0.3, weight_access=0.2)
+    assert high < 0.8 * low
+
+
+def test_cancel_stops_between_levels() -> None:
+    from urban_processing.errors import Cancelled
+
+    seen = []
+
+    def cancel(fraction: float, message: str) -> None:
+        seen.append((fraction, message))
+        if len(seen) == 3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        cogenerate(
+            site_of(LANDS["square"]), CogenerateParams(parcels=50), CallbackProgress(cancel)
+        )
+    assert len(seen) == 3
+    fractions = [f for f, _ in seen]
+    assert fractions == sorted(fractions)
+    assert "parcels" in seen[-1][1]
+
+
+def test_step_is_pure() -> None:
+    state = begin(site_of(LANDS["ell"]), CogenerateParams(min_area=400))
+    once, again = step(state), step(state)
+    assert np.array_equal(once.layout.mesh.xy, again.layout.mesh.xy)
+    assert state.level == 0
+    assert state.layout.mesh.n_faces == 1
+
+
+def test_estimate_is_near() -> None:
+    site = site_of(LANDS["star"])
+    params = CogenerateParams(min_area=300)
+    found = cogenerate(site, params).mesh.n_faces
+    assert estimate(site, params).parcels == pytest.approx(found, rel=0.1)
