@@ -20,5 +20,6 @@ def uniform(seed: int, lineage: UintArray, n_draws: int) -> npt.NDArray[np.float
     """(len(lineage), n_draws) numbers in [0, 1), a function of seed and lineage alone."""
     key = splitmix64(np.atleast_1d(np.array(seed % 2**64, dtype=np.uint64)))
     start = splitmix64(lineage ^ key)
-    draws = splitmix64(start[:, None] + np.arange(1, n_draws + 1, dtype=np.uint64))
+    count = np.arange(1, n_draws + 1).astype(np.uint64)
+    draws = splitmix64(np.asarray(start[:, None] + count, dtype=np.uint64))
     return np.asarray((draws >> np.uint64(11)).astype(np.float64) * 2.0**-53)

@@ -46,8 +46,8 @@ def simplify_site(site: Site, tolerance: float) -> Site:
     issue = Issue(
         code="boundary_simplified",
         message=(
-            f"The boundary was simplified by up to {tolerance:.3g} m, from {before} to {after} vertices; "
-            f"{moved:.0f} m² ({100 * moved / site.area:.2g} %) of land changed sides. "
+            f"The boundary was simplified by up to {tolerance:.3g} m, from {before} to {after} "
+            f"vertices; {moved:.0f} m² ({100 * moved / site.area:.2g} %) of land changed sides. "
             "simplify=0 keeps every vertex."
         ),
         value=float(moved),

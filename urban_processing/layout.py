@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.mesh.corner_graph import CornerGraph, build_corner_graph
 from urban_processing.hashing import splitmix64
+from urban_processing.mesh.corner_graph import CornerGraph, build_corner_graph
 from urban_processing.mesh.edit import Remap
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import Frame, Issue
@@ -150,9 +150,9 @@ class Layout:
         mesh = self.mesh
         used = (mesh.face != OUTSIDE) & np.repeat(self.edge_street, 2)
         h = np.flatnonzero(used)
-        return np.bincount(
-            mesh.face[h], weights=mesh.edge_length[h >> 1], minlength=mesh.n_faces
-        )
+        out = np.zeros(mesh.n_faces)
+        np.add.at(out, mesh.face[h], mesh.edge_length[h >> 1])
+        return out
 
     @cached_property
     def rim_parcel(self) -> BoolArray:
@@ -202,9 +202,7 @@ def edge_kinds(mesh: PlanarMesh) -> npt.NDArray[np.int8]:
     return np.asarray(sides.max(axis=1), dtype=np.int8)
 
 
-def _child_lineage(
-    parent: npt.NDArray[np.uint64], parent_face: IntArray
-) -> npt.NDArray[np.uint64]:
+def _child_lineage(parent: npt.NDArray[np.uint64], parent_face: IntArray) -> npt.NDArray[np.uint64]:
     """Path of the halves of cut faces: the parent's path and which half it is, hashed."""
     order = np.argsort(parent_face, kind="stable")
     first = np.searchsorted(parent_face[order], parent_face)

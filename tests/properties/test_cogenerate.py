@@ -10,8 +10,8 @@ import shapely
 import shapely.affinity
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
 from lands import LANDS, holed, site_of, star
+
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.metrics import certificate
 from urban_processing.params import CogenerateParams, StreetPattern
@@ -133,7 +133,11 @@ def test_lineages_are_unique_and_levels_count_cuts() -> None:
 
 
 def test_parts_are_laid_out_apart_and_small_ones_stay_whole() -> None:
-    parts = (shapely.box(0, 0, 300, 200), shapely.box(400, 0, 500, 100), shapely.box(600, 0, 610, 9))
+    parts = (
+        shapely.box(0, 0, 300, 200),
+        shapely.box(400, 0, 500, 100),
+        shapely.box(600, 0, 610, 9),
+    )
     layout = run(*parts, min_area=400)
     must_hold(layout)
     assert (np.bincount(layout.face_part) > [50, 8, 0]).all()
@@ -196,9 +200,7 @@ def test_cancel_stops_between_levels() -> None:
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        cogenerate(
-            site_of(LANDS["square"]), CogenerateParams(parcels=50), CallbackProgress(cancel)
-        )
+        cogenerate(site_of(LANDS["square"]), CogenerateParams(parcels=50), CallbackProgress(cancel))
     assert len(seen) == 3
     fractions = [f for f, _ in seen]
     assert fractions == sorted(fractions)

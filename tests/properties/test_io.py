@@ -15,9 +15,9 @@ from urban_processing.errors import BoundaryError
 from urban_processing.io import crs as rules
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.files import read_layout, write_layout
-from urban_processing.rebuild import canonical
 from urban_processing.layout import Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
+from urban_processing.rebuild import canonical
 from urban_processing.site import Frame, snap_to_grid
 
 UTM = "EPSG:32630"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from lands import ellipse
+
 from urban_processing.mesh.corners import (
     interior_angles,
     polygon_irregularity,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 import shapely.affinity
-
 from lands import LANDS
+
 from urban_processing.fields.cross import sample_field
 from urban_processing.fields.rings import RingBatch, make_batch
 from urban_processing.fields.tracing import trace
@@ -89,7 +89,13 @@ def test_streamlines_stay_inside(name: str) -> None:
     n = len(seeds)
     first = field.directions(np.zeros(n, dtype=int), seeds, np.ones(n, dtype=complex))
     arms = trace(
-        rings, field, np.zeros(n, dtype=int), seeds, first * 1j ** np.arange(n), 0.18, np.zeros(n, dtype=bool)
+        rings,
+        field,
+        np.zeros(n, dtype=int),
+        seeds,
+        first * 1j ** np.arange(n),
+        0.18,
+        np.zeros(n, dtype=bool),
     )
     good = np.flatnonzero(arms.edge >= 0)
     assert len(good) >= n // 2

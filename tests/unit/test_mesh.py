@@ -98,7 +98,11 @@ def test_split_edge_and_connect_make_two_faces() -> None:
     mesh = mesh_from_polygons([BOX(0, 0, 4, 2)])
     editor = MeshEditor(mesh)
     low, high = (
-        next(h for h in mesh.face_half_edges(0) if mesh.xy[mesh.origin[h], 1] == y == mesh.xy[mesh.target[h], 1])
+        next(
+            h
+            for h in mesh.face_half_edges(0)
+            if mesh.xy[mesh.origin[h], 1] == y == mesh.xy[mesh.target[h], 1]
+        )
         for y in (0, 2)
     )
     a = editor.split_edge(int(low), 2, 0)
@@ -110,7 +114,9 @@ def test_split_edge_and_connect_make_two_faces() -> None:
     # the left of the cut, which runs upward, keeps the face
     assert cut.face_area.tolist() == [4.5, 3.5]
     assert remap.face.tolist() == [0, 0]
-    assert sorted(remap.edge.tolist()) == [-1, -1, 0, 1, 2, 2, 3, 3] or (remap.edge == -1).sum() == 2
+    assert (
+        sorted(remap.edge.tolist()) == [-1, -1, 0, 1, 2, 2, 3, 3] or (remap.edge == -1).sum() == 2
+    )
     assert mesh.n_faces == 1
 
 

@@ -115,7 +115,7 @@ def test_one_straight_street_reaches_two_rows() -> None:
     layout = make_layout(boxes(6, 4))
     state = StreetState(layout, PRINTED)
     group = unreached_parcels(state)
-    (access,) = find_accesses(state, group, state.network_distance(), keep_ends=False)
+    (access,) = find_accesses(state, group, state.network_distance(), keep_ends=False, count=1)
     xy = layout.mesh.xy[state.graph.node_vertex]
     nodes = [state.start[access.chains[0]]] + [state.end[i] for i in access.chains]
     assert len(access.chains) == 4
@@ -127,7 +127,9 @@ def test_bent_group_gets_an_l_shaped_access() -> None:
     bent = {6, 7, 8, 13, 18}
     layout = make_layout(boxes(5, 5), locked=set(range(25)) - bent)
     state = StreetState(layout, PRINTED)
-    (access,) = find_accesses(state, sorted(bent), state.network_distance(), keep_ends=False)
+    (access,) = find_accesses(
+        state, sorted(bent), state.network_distance(), keep_ends=False, count=1
+    )
     turns = [b not in state.ahead[a] for a, b in itertools.pairwise(access.chains)]
     assert sum(turns) == 1
     for i in access.chains:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-
 from lands import LANDS, holed, site_of
+
 from urban_processing.land import first_layout, simplify_site
 from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams
@@ -211,7 +211,15 @@ def test_simplification_says_what_it_moved() -> None:
 
 def test_simplification_keeps_parts_apart() -> None:
     t = np.linspace(0, np.pi, 60)
-    bay = shapely.Polygon([*np.column_stack([100 * np.cos(t), 100 * np.sin(t)]), (-200, 0), (-200, 300), (200, 300), (200, 0)])
+    bay = shapely.Polygon(
+        [
+            *np.column_stack([100 * np.cos(t), 100 * np.sin(t)]),
+            (-200, 0),
+            (-200, 300),
+            (200, 300),
+            (200, 0),
+        ]
+    )
     island = shapely.Point(0, 97).buffer(1.5)
     site = simplify_site(site_of(bay, island), 20.0)
     assert site.parts[0].intersection(site.parts[1]).area == 0

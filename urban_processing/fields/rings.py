@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 
 ComplexArray = npt.NDArray[np.complex128]
+_T = TypeVar("_T", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +59,11 @@ def cross(a: ComplexArray, b: ComplexArray) -> FloatArray:
     return np.asarray(a.real * b.imag - a.imag * b.real)
 
 
-def pad(values: npt.NDArray[np.generic], offsets: IntArray, rings: IntArray) -> npt.NDArray[np.generic]:
+def pad(values: npt.NDArray[_T], offsets: IntArray, rings: IntArray) -> npt.NDArray[_T]:
     """(B, N) values of the chosen rings of a ragged array, the last one repeated."""
     count = offsets[rings + 1] - offsets[rings]
     index = np.minimum(np.arange(int(count.max()))[None], count[:, None] - 1)
-    return values[offsets[rings][:, None] + index]
+    return np.asarray(values[offsets[rings][:, None] + index])
 
 
 def make_batch(xy: FloatArray, offsets: IntArray, rings: IntArray) -> RingBatch:
@@ -84,7 +86,9 @@ def _preferred_axis(w: ComplexArray, after: ComplexArray) -> ComplexArray:
     """Direction modulo 90° of the boundary, of the two the one along which it is longer."""
     edge = after - w
     length = np.abs(edge)
-    fourfold = (np.where(length > 0, edge / np.maximum(length, 1e-300), 0) ** 4 * length).sum(axis=1)
+    fourfold = (np.where(length > 0, edge / np.maximum(length, 1e-300), 0) ** 4 * length).sum(
+        axis=1
+    )
     axis = np.exp(0.25j * np.angle(fourfold))
     turned = w * np.conj(axis)[:, None]
     wide, tall = np.ptp(turned.real, axis=1), np.ptp(turned.imag, axis=1)

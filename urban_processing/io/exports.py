@@ -15,9 +15,9 @@ from urban_processing.errors import DependencyError, OutputError, ParameterError
 from urban_processing.io.files import folder_problems, timeless
 from urban_processing.io.frames import table_frame
 from urban_processing.io.geopackage import field_arrays
-from urban_processing.rebuild import canonical
 from urban_processing.layout import Layout
 from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.rebuild import canonical
 from urban_processing.schema import LAYERS, GeometryType, Layer
 
 COORDINATE_DIGITS = "9"

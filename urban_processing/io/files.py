@@ -21,9 +21,9 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldE
 
 from urban_processing.errors import BoundaryError, OutputError, TopologyError
 from urban_processing.io.geopackage import read_state, write_geopackage
-from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.layout import Layout, Step
 from urban_processing.metrics.tables import layout_tables
+from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.schema import ISSUES, PARCELS, PROVENANCE, STREETS
 from urban_processing.site import FloatArray, Frame, Issue
 

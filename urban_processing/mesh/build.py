@@ -15,7 +15,8 @@ from urban_processing.site import snap_to_grid
 def mesh_from_polygons(polygons: Sequence[shapely.Polygon]) -> PlanarMesh:
     """Build the mesh whose face ``i`` is ``polygons[i]``.
 
-    Where rims touch at a single point, each gets a vertex of its own there. Neighbours must share vertices exactly (a valid coverage): a vertex of one that lies on
+    Where rims touch at a single point, each gets a vertex of its own there. Neighbours must
+    share vertices exactly (a valid coverage): a vertex of one that lies on
     another's boundary is a vertex of the other too. Coordinates are rounded to the grid.
 
     Raises

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from urban_processing.mesh.planar import (
+    OUTSIDE,
     BoolArray,
     FloatArray,
     IntArray,
     PlanarMesh,
-    OUTSIDE,
     rank_cycles,
 )
 
@@ -193,14 +193,10 @@ def _measure(
     return length, leaving / np.abs(leaving), arriving / np.abs(arriving)
 
 
-def _fan_out(
-    mesh: PlanarMesh, node_vertex: IntArray, first: IntArray
-) -> tuple[IntArray, IntArray]:
+def _fan_out(mesh: PlanarMesh, node_vertex: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
     """Chains that leave each node, clockwise from the one with the lowest half-edge."""
     rotation = mesh.next[np.arange(len(mesh.next)) ^ 1]
     leader, position = rank_cycles(rotation)
     vertex = mesh.origin[first]
     out = np.lexsort((position[first], leader[first], vertex))
-    return out, np.append(
-        np.searchsorted(vertex[out], node_vertex), len(out)
-    )
+    return out, np.append(np.searchsorted(vertex[out], node_vertex), len(out))

@@ -172,7 +172,7 @@ def _three_corners(xy: FloatArray) -> BoolArray:
 def sharpest_vertex(xy: FloatArray, offsets: IntArray) -> IntArray:
     """Index of the vertex with the smallest included angle of each ring."""
     turn = np.abs(interior_angles(xy, offsets) - np.pi)
-    turn = np.round(turn, 9)
+    turn = np.asarray(np.round(turn, 9), dtype=np.float64)
     top = np.maximum.reduceat(turn, offsets[:-1])
     return np.flatnonzero(_first_equal(turn, np.repeat(top, np.diff(offsets)), offsets))
 

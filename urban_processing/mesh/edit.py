@@ -168,8 +168,10 @@ class MeshEditor:
         self._drop_vertex(vertex)
 
     def collapse_edge(self, h: int) -> None:
-        """Merge the target of `h` into its origin; faces keep at least three edges by the
-        caller's care."""
+        """Merge the target of `h` into its origin.
+
+        It is the caller's care that faces keep at least three edges.
+        """
         t = h ^ 1
         kept, gone = self.origin[h], self.origin[t]
         for q in self.outgoing(gone):

@@ -98,7 +98,7 @@ class PlanarMesh:
     @cached_property
     def edge_is_boundary(self) -> BoolArray:
         """(E,) whether an edge lies on the rim of the land or of a hole."""
-        return (self.face.reshape(-1, 2) == OUTSIDE).any(axis=1)
+        return np.asarray((self.face.reshape(-1, 2) == OUTSIDE).any(axis=1))
 
     @cached_property
     def vertex_is_boundary(self) -> BoolArray:
@@ -145,9 +145,9 @@ class PlanarMesh:
     def face_area(self) -> FloatArray:
         """(F,) area of a face in m², its holes taken off."""
         inside = self.loops.face != OUTSIDE
-        return np.bincount(
-            self.loops.face[inside], weights=self.loop_area[inside], minlength=self.n_faces
-        )
+        out = np.zeros(self.n_faces)
+        np.add.at(out, self.loops.face[inside], self.loop_area[inside])
+        return out
 
     def face_half_edges(self, face: int) -> IntArray:
         """Half-edges around the (outer) loop of a face."""

@@ -61,7 +61,9 @@ class CogenerateParams(Params):
             },
         ),
     ] = StreetPattern.LOOP
-    seed: Annotated[int, Param(help="Random seed; the same seed gives the same bytes.", minimum=0)] = 0
+    seed: Annotated[
+        int, Param(help="Random seed; the same seed gives the same bytes.", minimum=0)
+    ] = 0
     simplify: Annotated[
         float | None,
         Param(

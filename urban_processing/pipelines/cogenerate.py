@@ -197,7 +197,7 @@ def step(state: State) -> State:
 def _shared_out(area: FloatArray, total: int) -> IntArray:
     """Divide a number of parcels over areas in proportion, at least one each."""
     exact = area * (total / area.sum())
-    quota = np.maximum(np.floor(exact).astype(np.int64), 1)
+    quota: IntArray = np.maximum(np.floor(exact).astype(np.int64), 1)
     missing = total - int(quota.sum())
     if missing > 0:
         order = np.argsort(np.round(quota - exact, 9), kind="stable")
@@ -222,9 +222,7 @@ def _divided(quota: IntArray, parent: IntArray, area: FloatArray) -> IntArray:
 
 
 def _with_streets(state: State, layout: Layout) -> Layout:
-    return extend_streets(
-        layout, state.params, level=state.level, keep_ends=_keeps_ends(state)
-    )
+    return extend_streets(layout, state.params, level=state.level, keep_ends=_keeps_ends(state))
 
 
 def _keeps_ends(state: State) -> bool:
@@ -249,9 +247,7 @@ def _levels_left(state: State) -> int:
 def finish(state: State) -> Layout:
     """Clean up the streets and list what the user should know."""
     params = state.params
-    layout = prune_streets(
-        state.layout, params, keep_ends=params.pattern is not StreetPattern.LOOP
-    )
+    layout = prune_streets(state.layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
     min_area = state.min_area
     if state.quota is not None:
         whole = layout.mesh.face_area >= min_area

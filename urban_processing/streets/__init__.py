@@ -1,0 +1,1 @@
+"""Streets that reach every parcel, and the network that they form."""

@@ -30,14 +30,19 @@ class Access(NamedTuple):
 
 
 def find_accesses(
-    state: StreetState, group: Sequence[int], distance: Sequence[float], *, keep_ends: bool
+    state: StreetState,
+    group: Sequence[int],
+    distance: Sequence[float],
+    *,
+    keep_ends: bool,
+    count: int,
 ) -> list[Access]:
     """Rank the I- and L-shaped accesses of a group, the best first.
 
     The shortest that reaches all parcels, an I before an L, else the one that reaches most,
     is the published rule; it holds where the rules look only one access ahead. Otherwise
     accesses are ranked by their length, their turn, the distance of their ends from the
-    network and the parcels they miss, and as many as the rules look ahead are returned.
+    network and the parcels they miss.
 
     Parameters
     ----------
@@ -49,11 +54,12 @@ def find_accesses(
         Distance of every node from the network, in parcel sides.
     keep_ends
         Whether the access needs only one connection.
+    count
+        Number of accesses wanted.
     """
     bits = {f: 1 << k for k, f in enumerate(group)}
     arms = _arms(state, bits)
-    count = state.rules.look_ahead
-    if count == 1:
+    if state.rules.look_ahead == 1:
         options = [
             Access(_published_rank(reached, size, turns), chains)
             for reached, size, turns, chains in _shapes(state, arms)

@@ -17,7 +17,7 @@ JOG_COST = 1.0
 JOG_DISTANCE = 0.6
 """Distance of junctions in parcel sides below which streets across look like a jog."""
 
-UNCLOSED_COST = 100.0
+UNCLOSED_COST = 1e4
 """Cost in parcel sides of an end that cannot be led on though dead ends are not wanted."""
 
 SPREAD = 1.5

@@ -7,7 +7,11 @@ from collections.abc import Sequence
 
 from urban_processing.streets.access import MISSED, Access, find_accesses
 from urban_processing.streets.connect import lay_access
+from urban_processing.streets.paths import UNCLOSED_COST
 from urban_processing.streets.state import StreetState
+
+LAST_RESORT = 40
+"""Number of accesses tried where none of the best can be connected and closed."""
 
 
 def reach_group(
@@ -25,8 +29,12 @@ def reach_group(
         group = [f for f in group if not state.is_reached(f)]
         if not group:
             return total
-        accesses = find_accesses(state, group, distance, keep_ends=keep_ends)
-        cost, streets = _cheapest(state, group, accesses, keep_ends=keep_ends)
+        cost, streets = math.inf, list[int]()
+        for count in (state.rules.look_ahead, LAST_RESORT):
+            accesses = find_accesses(state, group, distance, keep_ends=keep_ends, count=count)
+            cost, streets = _cheapest(state, group, accesses, keep_ends=keep_ends)
+            if cost < UNCLOSED_COST:
+                break
         total += cost
         if not streets:
             return math.inf

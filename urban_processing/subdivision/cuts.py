@@ -86,8 +86,9 @@ def place_seeds(
     rings = boundary.rings
     parcel, z = _lattice(field, rings, lineage, seed=seed, wanted=wanted)
     if not aligned:
-        none = np.empty(0)
-        return Seeds(parcel, z, none.astype(np.int64), none, none + 0j, none + 0j)
+        none = np.empty(0, dtype=np.complex128)
+        nowhere = np.empty(0, dtype=np.int64)
+        return Seeds(parcel, z, nowhere, np.empty(0), none, none)
     around = np.array([0, SATELLITE, 1j * SATELLITE, -SATELLITE, -1j * SATELLITE])
     rows = np.repeat(np.arange(len(rings.z)), len(around))
     near = np.tile(around, len(rings.z))
@@ -96,7 +97,10 @@ def place_seeds(
     return Seeds(
         np.concatenate([parcel, rows[inside]]),
         np.concatenate([z, near[inside]]),
-        *(np.concatenate(parts) for parts in zip(*roots, strict=True)),
+        root_parcel=np.concatenate([r[0] for r in roots]),
+        root_t=np.concatenate([r[1] for r in roots]),
+        root_z=np.concatenate([r[2] for r in roots]),
+        root_direction=np.concatenate([r[3] for r in roots]),
     )
 
 
@@ -248,9 +252,7 @@ def _ring_length(boundary: Boundary, field_t: FloatArray, arms: Traces) -> Float
     return np.asarray(np.where(t >= perimeter, t - perimeter, t))
 
 
-def halving_cuts(
-    boundary: Boundary, field: FieldGrid, parcel: IntArray, share: FloatArray
-) -> Cuts:
+def halving_cuts(boundary: Boundary, field: FieldGrid, parcel: IntArray, share: FloatArray) -> Cuts:
     """Straight cuts along both local axes that leave `share` (n,) of the area below them.
 
     Lines that cross the boundary more than twice are left out.

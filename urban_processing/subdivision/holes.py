@@ -162,9 +162,7 @@ def _drawn(
 ) -> tuple[Layout, IntArray] | None:
     """Draw the cuts; the loops of the face that fall to the new side follow it."""
     editor = MeshEditor(layout.mesh)
-    ends = []
-    for ray in rays:
-        ends.append(_end_vertex(editor, layout, ray, snap))
+    ends = [_end_vertex(editor, layout, ray, snap) for ray in rays]
     if len(set(ends)) < len(ends):
         return None
     for ray, end in zip(rays, ends, strict=True):
@@ -180,29 +178,33 @@ def _drawn(
 
 
 def _end_vertex(editor: MeshEditor, layout: Layout, ray: _Ray, snap: float) -> int:
+    """Vertex at the far end of a cut: one that is near, or a new one."""
     h = ray.half_edge
     # an edge already split for the other cut: find the piece that holds the point
     last = int(layout.mesh.target[h])
-    z = lambda v: complex(editor.x[v], editor.y[v])  # noqa: E731
-    start = z(editor.origin[h])
-    while editor.origin[h ^ 1] != last and abs(z(editor.origin[h ^ 1]) - start) < abs(ray.point - start):
+    start = _at(editor, editor.origin[h])
+    reach = abs(ray.point - start)
+    while editor.origin[h ^ 1] != last and abs(_at(editor, editor.origin[h ^ 1]) - start) < reach:
         h = editor.next[h]
     for vertex in (editor.origin[h], editor.origin[h ^ 1]):
-        if abs(z(vertex) - ray.point) < snap and vertex != ray.vertex:
+        if abs(_at(editor, vertex) - ray.point) < snap and vertex != ray.vertex:
             return vertex
     return editor.origin[editor.split_edge(h, ray.point.real, ray.point.imag)]
 
 
+def _at(editor: MeshEditor, vertex: int) -> complex:
+    return complex(editor.x[vertex], editor.y[vertex])
+
+
 def _leaving_towards(editor: MeshEditor, vertex: int, towards: int, face: int) -> int | None:
     """The half-edge that leaves a vertex such that the direction lies in the face beside it."""
-    at = complex(editor.x[vertex], editor.y[vertex])
-    way = complex(editor.x[towards], editor.y[towards]) - at
+    at = _at(editor, vertex)
+    way = _at(editor, towards) - at
     for h in editor.outgoing(vertex):
         if editor.face[h] != face:
             continue
-        ahead = complex(editor.x[editor.origin[h ^ 1]], editor.y[editor.origin[h ^ 1]]) - at
-        before = editor.prev[h]
-        back = complex(editor.x[editor.origin[before]], editor.y[editor.origin[before]]) - at
+        ahead = _at(editor, editor.origin[h ^ 1]) - at
+        back = _at(editor, editor.origin[editor.prev[h]]) - at
         opening = np.angle(back / ahead) % (2 * np.pi) or 2 * np.pi
         if np.angle(way / ahead) % (2 * np.pi) < opening:
             return h

@@ -144,9 +144,7 @@ class _Inserter:
         return None if best is None else best[1]
 
     def _is_node(self, vertex: int) -> bool:
-        return (
-            vertex >= self.n_old or self.editor.valence[vertex] > 2 or self.corner[vertex]
-        )
+        return vertex >= self.n_old or self.editor.valence[vertex] > 2 or self.corner[vertex]
 
     def apply(self, drafts: list[_Draft]) -> list[int]:
         """Draw the legal drafts; returns the rows that were cut."""
@@ -176,9 +174,7 @@ class _Inserter:
         xy, of = shapely.get_coordinates(lines, return_index=True)
         cuts = np.cumsum(np.bincount(of, minlength=len(drafts)))[:-1]
         paths = np.split(snap_to_grid(xy), cuts)
-        return [
-            _Draft(d.row, d.start, d.stop, path) for d, path in zip(drafts, paths, strict=True)
-        ]
+        return [_Draft(d.row, d.start, d.stop, path) for d, path in zip(drafts, paths, strict=True)]
 
     def _ring_vertices(self, draft: _Draft) -> list[int]:
         """Vertices of the parcel's ring, from the cut's start."""
@@ -240,4 +236,3 @@ def _with_ends(
     length = np.append(0.0, np.cumsum(step))
     s = (length / length[-1])[:, None] if length[-1] > 0 else np.linspace(0, 1, len(path))[:, None]
     return np.asarray(path + (1 - s) * (start - path[0]) + s * (stop - path[-1]))
-

@@ -94,9 +94,7 @@ def parcel_rings(layout: Layout, faces: IntArray) -> ParcelRings:
     )
 
 
-def _ring_corners(
-    layout: Layout, xy: FloatArray, offsets: IntArray, vertex: IntArray
-) -> BoolArray:
+def _ring_corners(layout: Layout, xy: FloatArray, offsets: IntArray, vertex: IntArray) -> BoolArray:
     """Corners of the approximate polygons: found on the shape, or from those given."""
     out = np.zeros(len(xy), dtype=bool)
     if layout.corners_given:
@@ -204,7 +202,9 @@ class Boundary:
         step = np.where(self.street[parcel, k], np.abs(self.edge[parcel, k]), 0.0)
         return self._street_sum[parcel, k] + along * step
 
-    def twice_area_between(self, parcel: IntArray, start: FloatArray, stop: FloatArray) -> FloatArray:
+    def twice_area_between(
+        self, parcel: IntArray, start: FloatArray, stop: FloatArray
+    ) -> FloatArray:
         """∑ z × z' along the ring from `start` forward to `stop`."""
         part = self._twice_area_to(parcel, stop) - self._twice_area_to(parcel, start)
         return part + np.where(stop < start, self._cross_sum[parcel, -1], 0.0)

@@ -77,7 +77,7 @@ def _quota_table() -> FloatArray:
     table[1] = side_irregularity(aspect)
 
     def row(n: int, r: FloatArray) -> FloatArray:
-        return np.interp(np.abs(np.log(r)), _LOG_ASPECT, table[n])
+        return np.asarray(np.interp(np.abs(np.log(r)), _LOG_ASPECT, table[n]))
 
     for n in range(2, LARGEST + 1):
         best = np.full(len(aspect), np.inf)

@@ -12,8 +12,8 @@ from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS, STRAIGHT_ANGLE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.subdivision.cuts import CLEARANCE, Cuts
-from urban_processing.subdivision.prospect import prospect_of_area, prospect_of_quota
 from urban_processing.subdivision.parcels import CONTINUES_ANGLE, Boundary
+from urban_processing.subdivision.prospect import prospect_of_area, prospect_of_quota
 
 ALTERNATIVES = 4
 """Number of ranked cuts kept for each parcel."""
@@ -113,7 +113,9 @@ def score_cuts(
         ends += _continues(boundary, cuts.parcel, node_b, -cuts.arriving)
         quality += params.continuity * 0.5 * ends
     if params.orientation is not None:
-        quality += params.weight_orientation * _oriented(boundary, cuts.parcel, b - a, params.orientation)
+        quality += params.weight_orientation * _oriented(
+            boundary, cuts.parcel, b - a, params.orientation
+        )
     if rules.variation > 0:
         quality += rules.variation * _noise(cuts.parcel, lineage, params.seed)
     legal = (smaller >= min_share[cuts.parcel]) & (left.n >= 3) & (right.n >= 3)
@@ -121,7 +123,13 @@ def score_cuts(
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
     return ScoredCuts(
-        cuts, t_a, t_b, area, np.column_stack([left.irregularity, right.irregularity]), reached, quality
+        cuts,
+        t_a,
+        t_b,
+        area,
+        np.column_stack([left.irregularity, right.irregularity]),
+        reached,
+        quality,
     )
 
 
@@ -255,7 +263,9 @@ def _half(
     width = int(count.max(initial=0))
     first = _run_start(between, number[parcel], count)
     k = (first[:, None] + np.arange(width)[None]) % n_own[:, None]
-    z = np.concatenate([a[:, None], b[:, None], np.take_along_axis(corner_z[parcel], k, axis=1)], axis=1)
+    z = np.concatenate(
+        [a[:, None], b[:, None], np.take_along_axis(corner_z[parcel], k, axis=1)], axis=1
+    )
     z, n = _thinned(z, count + 2)
     return _measured(z, n)
 
@@ -314,8 +324,9 @@ def _measured(z: ComplexArray, n: IntArray) -> _Half:
     g_angle, g_side = IRREGULARITY_WEIGHTS
     safe = np.where(mean_side > 0, mean_side, 1.0)
     aspect = np.zeros(len(z))
-    quad = np.flatnonzero((n == 4) & (side[:, :4].min(axis=1) > 0)) if z.shape[1] > 3 else []
-    aspect[quad] = (side[quad, 0] + side[quad, 2]) / (side[quad, 1] + side[quad, 3])
+    if z.shape[1] > 3:
+        quad = np.flatnonzero((n == 4) & (side[:, :4].min(axis=1) > 0))
+        aspect[quad] = (side[quad, 0] + side[quad, 2]) / (side[quad, 1] + side[quad, 3])
     return _Half(
         irregularity=g_angle * by_angle + g_side * by_side / safe**2,
         by_angle=g_angle * by_angle,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -124,7 +125,7 @@ class _Merger:
             return False
         ends = e.origin[chain[0]], e.origin[chain[-1] ^ 1]
         inner = [e.origin[h] for h in chain[1:]]
-        linked = all(e.next[a] == b for a, b in zip(chain, chain[1:], strict=False))
+        linked = all(e.next[a] == b for a, b in pairwise(chain))
         return (
             linked
             and ends[0] != ends[1]
@@ -266,6 +267,7 @@ class _Merger:
                 ring.pop()
             rings.append(ring)
         return _shapes(rings)
+
 
 @dataclass(frozen=True, eq=False)
 class _Shapes:

@@ -168,9 +168,7 @@ def _field_rings(
     return rings, np.concatenate([t, close], axis=1)
 
 
-def _as_cuts(
-    boundary: Boundary, scored: ScoredCuts, chosen: IntArray
-) -> Iterator[tuple[int, Cut]]:
+def _as_cuts(boundary: Boundary, scored: ScoredCuts, chosen: IntArray) -> Iterator[tuple[int, Cut]]:
     """Chosen cuts in terms of the mesh: half-edges of the ring and map positions."""
     parcel = scored.cuts.parcel[chosen]
     last = boundary.rings.count[parcel] - 1
@@ -181,7 +179,7 @@ def _as_cuts(
         return
     count = np.array([len(path) for path in paths])
     xy = boundary.rings.to_map(np.repeat(parcel, count), np.concatenate(paths))
-    for row, *ends, path, quality in zip(
+    for row, e_a, s_a, e_b, s_b, path, quality in zip(
         parcel.tolist(),
         np.minimum(edge_a, last).tolist(),
         along_a.tolist(),
@@ -191,4 +189,4 @@ def _as_cuts(
         scored.quality[chosen].tolist(),
         strict=True,
     ):
-        yield row, Cut(*ends, path, quality)
+        yield row, Cut(e_a, s_a, e_b, s_b, path, quality)
