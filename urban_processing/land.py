@@ -20,6 +20,13 @@ smaller than a parcel make parcels that nobody wants."""
 MOVED_SHARE = 0.05
 """Simplification may move this share of a part's area; strips and small parts need less."""
 
+MITRE_LIMIT = 5.0
+NARROW_AREA = 0.2
+"""Inlets and spurs smaller than this many squared tolerances are left to the simplification."""
+
+HAIR = 1e-3
+"""Widening of what is filled or cut off, in tolerances."""
+
 
 def default_tolerance(min_area: float) -> float:
     """Tolerance in metres of the simplification of a boundary for parcels of `min_area` m²."""
@@ -29,8 +36,9 @@ def default_tolerance(min_area: float) -> float:
 def simplify_site(site: Site, tolerance: float) -> Site:
     """Simplify the land's rings and say how much land changed sides.
 
-    Douglas–Peucker from the sharpest corner of each ring, topology kept. Parts that would
-    overlap others afterwards stay as they are.
+    Inlets and spurs narrower than the tolerance go first; then Douglas–Peucker from the
+    sharpest corner of each ring, topology kept. Parts that would overlap others afterwards
+    stay as they are.
     """
     if tolerance <= 0:
         return site
@@ -67,13 +75,37 @@ def _simplified(part: shapely.Polygon, tolerance: float) -> shapely.Polygon:
 
 
 def _simplified_once(part: shapely.Polygon, tolerance: float) -> shapely.Polygon:
-    rings = [_from_sharpest(ring) for ring in (part.exterior, *part.interiors)]
+    even = _without_narrows(part, tolerance)
+    rings = [_from_sharpest(ring) for ring in (even.exterior, *even.interiors)]
     start = shapely.Polygon(rings[0], rings[1:])
     simple = shapely.simplify(start, tolerance, preserve_topology=True)
     simple = shapely.set_precision(simple, GRID)
     if not isinstance(simple, shapely.Polygon) or simple.is_empty or not simple.is_valid:
         return part
     return shapely.orient_polygons(simple)
+
+
+def _without_narrows(part: shapely.Polygon, width: float) -> shapely.Polygon:
+    """Fill inlets and cut off spurs that are narrower than `width`; the rest stays as it is."""
+    for sign in (1.0, -1.0):
+        reach = 0.5 * width * sign
+        there = part.buffer(reach, join_style="mitre", mitre_limit=MITRE_LIMIT)
+        back = there.buffer(-reach, join_style="mitre", mitre_limit=MITRE_LIMIT)
+        changes = back.difference(part) if sign > 0 else part.difference(back)
+        narrow = [
+            piece
+            for piece in shapely.get_parts(changes)
+            if piece.geom_type == "Polygon" and piece.area > NARROW_AREA * width * width
+        ]
+        if not narrow:
+            continue
+        # a hair wider, so that the pieces leave no slits
+        pieces = shapely.union_all(narrow).buffer(HAIR * width, join_style="mitre")
+        changed = part.union(pieces) if sign > 0 else part.difference(pieces)
+        # a spur may hold an island of land on to the rest: then it stays
+        if isinstance(changed, shapely.Polygon) and len(changed.interiors) == len(part.interiors):
+            part = changed
+    return part
 
 
 def _from_sharpest(ring: shapely.LinearRing) -> shapely.LinearRing:
