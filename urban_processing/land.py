@@ -103,7 +103,8 @@ def _without_narrows(part: shapely.Polygon, width: float) -> shapely.Polygon:
         pieces = shapely.union_all(narrow).buffer(HAIR * width, join_style="mitre")
         changed = part.union(pieces) if sign > 0 else part.difference(pieces)
         # a spur may hold an island of land on to the rest: then it stays
-        if isinstance(changed, shapely.Polygon) and len(changed.interiors) == len(part.interiors):
+        whole = isinstance(changed, shapely.Polygon) and not changed.is_empty
+        if whole and len(changed.interiors) == len(part.interiors):
             part = changed
     return part
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from lands import LANDS, holed, site_of, star
 
 from urban_processing.layout import EdgeKind, Layout
-from urban_processing.metrics import certificate
+from urban_processing.metrics import certificate, measure
+from urban_processing.metrics.tables import parcel_table
 from urban_processing.params import CogenerateParams, StreetPattern
 from urban_processing.pipelines.cogenerate import begin, cogenerate, estimate, step
 from urban_processing.progress import CallbackProgress
@@ -171,22 +172,49 @@ def test_given_corners_shape_the_first_cut() -> None:
     assert np.abs(flagged).max(axis=0) == pytest.approx([300, 200])
 
 
-def interior_means(**values: object) -> tuple[float, float]:
-    """Mean irregularity, and mean share of parcels' perimeters that is street."""
-    from urban_processing.metrics import measure
-
-    figures = {
-        m.metric: m.value
-        for m in measure(run(LANDS["star"], parcels=150, **values))
-        if m.part is None
-    }
-    return figures["irregularity_mean"], figures["street_share_pct"]
+def figures(name: str, **values: object) -> dict[str, float]:
+    """Figures of a layout of a few hundred parcels, and the mean aspect ratio of parcels."""
+    layout = run(LANDS[name], parcels=200, **values)
+    found = {m.metric: m.value for m in measure(layout) if m.part is None}
+    columns = parcel_table(layout).columns
+    aspect = columns["depth_m"] / columns["width_m"]
+    found["aspect"] = float(np.nanmean(np.maximum(aspect, 1 / aspect)))
+    return found
 
 
-def test_weight_of_regularity_lowers_irregularity() -> None:
-    low, _ = interior_means(weight_regularity=0.05, weight_size=0.3, weight_access=0.2)
-    high, _ = interior_means(weight_regularity=2.0, weight_size=0.3, weight_access=0.2)
-    assert high < 0.8 * low
+@pytest.mark.parametrize("name", ["star", "triangle", "square"])
+def test_weight_of_regularity_lowers_irregularity(name: str) -> None:
+    low = figures(name, weight_regularity=0.05, weight_size=0.3, weight_access=0.2)
+    high = figures(name, weight_regularity=2.0, weight_size=0.3, weight_access=0.2)
+    assert high["irregularity_mean"] < 0.85 * low["irregularity_mean"]
+
+
+def test_weight_of_access_lengthens_parcels_along_fewer_streets() -> None:
+    low = [figures(name, weight_access=0.0) for name in ("star", "square", "strip")]
+    high = [figures(name, weight_access=0.6) for name in ("star", "square", "strip")]
+
+    def mean(found: list[dict[str, float]], metric: str) -> float:
+        return float(np.mean([f[metric] for f in found]))
+
+    assert mean(high, "aspect") > 1.05 * mean(low, "aspect")
+    assert mean(high, "street_length_relative") < mean(low, "street_length_relative")
+
+
+def test_orientation_turns_the_long_sides_of_parcels() -> None:
+    def share_along(orientation: float) -> float:
+        """Share of elongated parcels whose long side runs east-west."""
+        layout = run(LANDS["star"], parcels=200, orientation=orientation, weight_orientation=1.0)
+        boxes = shapely.minimum_rotated_rectangle(layout.mesh.face_polygons())
+        corners = np.array([shapely.get_coordinates(b)[:3] for b in boxes])
+        sides = np.diff(corners, axis=1)
+        length = np.hypot(sides[..., 0], sides[..., 1])
+        longest = sides[np.arange(len(sides)), length.argmax(axis=1)]
+        elongated = length.max(axis=1) > 1.3 * length.min(axis=1)
+        east_west = np.abs(longest[:, 0]) > np.abs(longest[:, 1])
+        return float(east_west[elongated].mean())
+
+    assert share_along(0.0) > 0.65
+    assert share_along(90.0) < 0.35
 
 
 def test_cancel_stops_between_levels() -> None:

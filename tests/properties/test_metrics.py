@@ -162,6 +162,6 @@ def test_the_certificate_sees_a_parcel_that_moved(seed: int, shift: float) -> No
     xy = mesh.xy.copy()
     xy[np.flatnonzero(mesh.vertex_is_boundary)[0]] -= shift
     moved = type(mesh)(xy, mesh.origin, mesh.next, mesh.face, mesh.n_faces)
-    land = [shapely.box(0, 0, SIZE, SIZE)]
+    land = [shapely.union_all(mesh.face_polygons())]
     assert certificate(layout, land=land).check("land_covered").holds
     assert not certificate(layout.replace(mesh=moved), land=land).check("land_covered").holds

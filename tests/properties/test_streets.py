@@ -20,6 +20,7 @@ from urban_processing.mesh.edit import MeshEditor
 from urban_processing.params import CogenerateParams, Preset
 from urban_processing.site import Frame
 from urban_processing.streets.access_rule import is_reached
+from urban_processing.streets.blocks import LARGEST_BLOCK
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 
@@ -212,14 +213,14 @@ def test_first_access_becomes_the_network_where_the_rim_is_no_street(
 
 
 def test_loops_are_economical() -> None:
-    """The recommended rules keep streets short and blocks of five to twenty parcels."""
+    """The recommended rules keep streets short and blocks of a moderate size."""
     params = CogenerateParams(parcels=512)
     layout = layouts("rectangle", 9, 0, params, keep_ends=False)[-1]
     layout = prune_streets(layout, params, keep_ends=False)
     assert layout.mesh.n_faces == 512
     assert interior_length(layout) <= 0.65
     parcels_of_block = np.bincount(_blocks(layout))
-    assert parcels_of_block.max() <= 20
+    assert parcels_of_block.max() <= LARGEST_BLOCK
     assert (parcels_of_block <= 3).mean() < 0.05
 
 

@@ -15,7 +15,7 @@ from urban_processing.params import CogenerateParams, Preset
 from urban_processing.site import Frame
 from urban_processing.streets.access import find_accesses
 from urban_processing.streets.access_rule import ACCESS_SHARE, is_reached, required_frontage
-from urban_processing.streets.blocks import small_block_deficit, through_length
+from urban_processing.streets.blocks import LARGEST_BLOCK, small_block_deficit, through_length
 from urban_processing.streets.ends import close_end, prune_tails, retract_ends
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.groups import group_parcels, unreached_parcels
@@ -253,7 +253,7 @@ def test_long_block_is_split() -> None:
     layout = extend_streets(make_layout(boxes(30, 2)), PARAMS, level=1, keep_ends=False)
     state = StreetState(layout, PARAMS)
     sizes = [len(flood_block(state, f)) for f in range(60)]
-    assert max(sizes) <= 20
+    assert max(sizes) <= LARGEST_BLOCK
     assert min(sizes) >= 5
     # the paper does not limit the length of blocks
     printed = extend_streets(make_layout(boxes(30, 2)), PRINTED, level=1, keep_ends=False)
@@ -272,7 +272,7 @@ def test_redundant_links_go_and_blocks_stay_small() -> None:
     assert pruned.edge_street[pruned.edge_kind == EdgeKind.RIM].all()
     assert (pruned.edge_level[~pruned.edge_street] == -1).all()
     state = StreetState(pruned, PARAMS)
-    assert max(len(flood_block(state, f)) for f in range(64)) <= 20
+    assert max(len(flood_block(state, f)) for f in range(64)) <= LARGEST_BLOCK
 
 
 def test_links_run_from_junction_to_junction() -> None:

@@ -88,7 +88,8 @@ class CogenerateParams(Params):
     preset: Annotated[
         Preset,
         Param(
-            help="Weights and rules to start from: ours, or those printed in Chen et al. 2024.",
+            help="Weights and rules to start from: the recommended ones, or those printed in "
+            "Chen et al. 2024.",
             labels={"recommended": "Recommended", "chen2024": "Chen et al. 2024, as printed"},
         ),
     ] = Preset.RECOMMENDED
@@ -173,7 +174,7 @@ class CogenerateParams(Params):
             advanced=True,
             group=_STREETS,
         ),
-    ] = 2.0
+    ] = 4.0
     cul_de_sac_levels: Annotated[
         int,
         Param(
@@ -267,7 +268,7 @@ RULES: dict[Preset, Rules] = {
         continuity=0.05,
         clearance=0.4,
         variation=0.01,
-        prospect=6.0,
+        prospect=3.0,
         aligned_seeds=True,
         snap=0.08,
         look_ahead=6,

@@ -31,7 +31,7 @@ FLOOR_SHARE = 0.6
 VERY_LARGE = 3.0
 """Parcels above so many smallest areas are listed in the issues."""
 
-SECONDS_PER_PARCEL = 2.2e-3
+SECONDS_PER_PARCEL = 1.2e-3
 """For the estimate that is given before a long run; one core of a common machine."""
 
 
