@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urban_processing.mesh.planar import FloatArray, IntArray, PlanarMesh
+from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import GRID
 
 
@@ -41,6 +41,7 @@ class MeshEditor:
         self.half_edge_of: list[int] = mesh.vertex_half_edge.tolist()
         self.edge_parent: list[int] = list(range(mesh.n_edges))
         self.face_parent: list[int] = list(range(mesh.n_faces))
+        self.dropped_faces: set[int] = set()
         self._n_old_vertices = mesh.n_vertices
 
     def ring(self, half_edge: int) -> list[int]:
@@ -152,6 +153,27 @@ class MeshEditor:
         self.next[h] = following
         self.prev[following] = h
 
+    def remove_chain(self, chain: list[int]) -> None:
+        """Take away a chain between two faces; the face on its left takes over the other one.
+
+        `chain` lists its half-edges in order; its inner vertices have valence 2 and go too.
+        """
+        first, last = chain[0], chain[-1]
+        face, absorbed = self.face[first], self.face[first ^ 1]
+        for h in self.ring(first ^ 1):
+            self.face[h] = face
+        start, stop = self.origin[first], self.origin[last ^ 1]
+        self._link(self.prev[first], self.next[first ^ 1])
+        self._link(self.prev[last ^ 1], self.next[last])
+        for vertex, leaving in ((start, self.next[first ^ 1]), (stop, self.next[last])):
+            self.valence[vertex] -= 1
+            self.half_edge_of[vertex] = leaving
+        for h in chain:
+            if h != first:
+                self._drop_vertex(self.origin[h])
+            self._drop_edge(h)
+        self.dropped_faces.add(absorbed)
+
     def dissolve_vertex(self, vertex: int) -> None:
         """Remove a vertex of valence 2; its two edges become one straight edge."""
         h = self.half_edge_of[vertex]
@@ -218,16 +240,21 @@ class MeshEditor:
         new_half = np.full(len(origin), -1)
         new_half[half] = np.arange(len(half))
         xy = np.column_stack([self.x, self.y])[alive]
+        faces = np.setdiff1d(
+            np.arange(len(self.face_parent)), np.array(sorted(self.dropped_faces), dtype=np.int64)
+        )
+        new_face = np.full(len(self.face_parent) + 1, OUTSIDE)  # the last stands for outside
+        new_face[faces] = np.arange(len(faces))
         mesh = PlanarMesh(
             xy,
             new_vertex[origin[half]],
             new_half[nxt[half]],
-            face[half],
-            len(self.face_parent),
+            new_face[face[half]],
+            len(faces),
         )
         remap = Remap(
             vertex=np.where(alive < self._n_old_vertices, alive, -1),
             edge=np.array(self.edge_parent, dtype=np.int64)[edges],
-            face=np.array(self.face_parent, dtype=np.int64),
+            face=np.array(self.face_parent, dtype=np.int64)[faces],
         )
         return mesh, remap

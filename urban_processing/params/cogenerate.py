@@ -174,7 +174,7 @@ class CogenerateParams(Params):
             advanced=True,
             group=_STREETS,
         ),
-    ] = 4.0
+    ] = 6.0
     cul_de_sac_levels: Annotated[
         int,
         Param(
@@ -239,6 +239,8 @@ class Rules:
     prospect
         Weight of the parcels that later cuts can make of a half, in rating its proportions;
         0 rates the half's own proportions.
+    recut
+        Whether irregular parcels are joined with a neighbour and cut again in the end.
     aligned_seeds
         Also seed at the centroid, beside reflex corners and where neighbours' cuts end.
     snap
@@ -255,6 +257,7 @@ class Rules:
     clearance: float
     variation: float
     prospect: float
+    recut: bool
     aligned_seeds: bool
     snap: float
     look_ahead: int
@@ -263,12 +266,13 @@ class Rules:
 
 RULES: dict[Preset, Rules] = {
     Preset.RECOMMENDED: Rules(
-        weights=(0.3, 0.9, 0.1),
+        weights=(0.3, 0.9, 0.15),
         size_cap=0.7,
         continuity=0.05,
         clearance=0.4,
         variation=0.01,
         prospect=3.0,
+        recut=True,
         aligned_seeds=True,
         snap=0.08,
         look_ahead=6,
@@ -281,6 +285,7 @@ RULES: dict[Preset, Rules] = {
         clearance=0.0,
         variation=0.0,
         prospect=0.0,
+        recut=False,
         aligned_seeds=False,
         snap=0.0,
         look_ahead=1,

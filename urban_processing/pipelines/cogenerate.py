@@ -20,6 +20,7 @@ from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
+from urban_processing.subdivision.recut import recut_irregular
 from urban_processing.version import __version__
 
 MEAN_OVER_MIN = 1.37
@@ -247,7 +248,10 @@ def _levels_left(state: State) -> int:
 def finish(state: State) -> Layout:
     """Clean up the streets and list what the user should know."""
     params = state.params
-    layout = prune_streets(state.layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
+    layout = state.layout
+    if params.rules.recut:
+        layout = recut_irregular(layout, min_area=state.min_area, params=params)
+    layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
     min_area = state.min_area
     if state.quota is not None:
         whole = layout.mesh.face_area >= min_area

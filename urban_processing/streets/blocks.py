@@ -10,7 +10,7 @@ from urban_processing.streets.state import StreetState
 SMALL_BLOCK = 5
 """Blocks of fewer parcels are charged for each parcel that they lack."""
 
-LARGEST_BLOCK = 32
+LARGEST_BLOCK = 48
 """Number of parcels above which a block is split, and up to which blocks are merged."""
 
 THROUGH_COST = 0.2

@@ -1,0 +1,191 @@
+"""Cutting irregular parcels again, together with a neighbour.
+
+Cuts are chosen parcel by parcel, from the large to the small; near a notched rim the last ones
+leave parcels that a look at two of them together would have avoided. In the end each irregular
+parcel is joined with a neighbour and the two are cut anew; what is better is kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from urban_processing.layout import Layout
+from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
+from urban_processing.mesh.edit import MeshEditor
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
+from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.streets.access_rule import is_reached
+from urban_processing.subdivision.insert import insert_cuts
+from urban_processing.subdivision.parcels import parcel_rings
+from urban_processing.subdivision.streamline import propose_cuts
+
+IRREGULAR = 0.1
+"""Parcels above this irregularity, and triangles, are cut again."""
+
+SIDES_COST = 0.05
+"""Cost, in irregularity, of a parcel that has not four sides."""
+
+LEAST_GAIN = 0.01
+"""Two parcels are changed only if they gain this much together."""
+
+SPREAD_COST = 0.1
+"""Cost, in irregularity, of the larger of two new parcels being twice the smaller one."""
+
+ROUNDS = 3
+"""Rounds over all irregular parcels, each with another neighbour."""
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two neighbours, and the chain of half-edges between them with the first on its left."""
+
+    keeps: int
+    goes: int
+    chain: tuple[int, ...]
+
+
+def recut_irregular(layout: Layout, *, min_area: float, params: CogenerateParams) -> Layout:
+    """Join irregular parcels with a neighbour each and cut the two anew where that is better.
+
+    The parcels on both sides of a street are never joined, and both new parcels must be
+    reached by the streets that there are. The number of parcels stays the same.
+    """
+    tried: set[frozenset[int]] = set()
+    for _ in range(ROUNDS):
+        pairs = _choose_pairs(layout, tried)
+        if not pairs:
+            break
+        layout = _recut(layout, pairs, min_area, params)
+    return layout
+
+
+def _costs(layout: Layout) -> FloatArray:
+    """(F,) irregularity of each parcel, and what it costs not to have four sides."""
+    mesh = layout.mesh
+    loops = mesh.loops
+    rings = [loops.ring(int(i)) for i in mesh.face_loop]
+    xy = mesh.xy[mesh.origin[np.concatenate(rings)]]
+    corners, offsets = reported_polygons(xy, np.append(0, np.cumsum([len(r) for r in rings])))
+    irregularity = polygon_irregularity(xy[corners], offsets)
+    return np.asarray(irregularity + SIDES_COST * (np.diff(offsets) != 4))
+
+
+def _choose_pairs(layout: Layout, tried: set[frozenset[int]]) -> list[_Pair]:
+    """Pair each offender, the worst first, with the neighbour along its longest side."""
+    graph = layout.corner_graph
+    cost = _costs(layout)
+    lineage = layout.face_lineage.tolist()
+    left, right = graph.face[0::2], graph.face[1::2]
+    inner = (left != OUTSIDE) & (right != OUTSIDE) & (left != right)
+    inner &= ~layout.chain_street[0::2]
+    inner[inner] &= ~(layout.face_locked[left[inner]] | layout.face_locked[right[inner]])
+    usable = np.flatnonzero(inner & _only_contact(left, right))
+    by_face: dict[int, list[int]] = {}
+    for i in usable[np.argsort(-graph.length[2 * usable], kind="stable")].tolist():
+        by_face.setdefault(int(left[i]), []).append(i)
+        by_face.setdefault(int(right[i]), []).append(i)
+    taken: set[int] = set()
+    pairs = []
+    single = layout.mesh.face_n_loops == 1
+    for face in np.argsort(-np.round(cost, 9), kind="stable").tolist():
+        if cost[face] < min(IRREGULAR, SIDES_COST):
+            break
+        for i in by_face.get(face, []) if face not in taken and single[face] else []:
+            other = int(right[i]) if left[i] == face else int(left[i])
+            key = frozenset((lineage[face], lineage[other]))
+            if other in taken or key in tried or not single[other]:
+                continue
+            tried.add(key)
+            taken |= {face, other}
+            chain = graph.half_edges[graph.offsets[2 * i] : graph.offsets[2 * i + 1]]
+            pairs.append(_Pair(int(left[i]), int(right[i]), tuple(chain.tolist())))
+            break
+    return pairs
+
+
+def _only_contact(left: IntArray, right: IntArray) -> BoolArray:
+    """Which chains are all that their two faces share."""
+    low, high = np.minimum(left, right), np.maximum(left, right)
+    key = low * (int(high.max()) + 1) + high
+    _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray(count[inverse.ravel()] == 1)
+
+
+def _recut(layout: Layout, pairs: list[_Pair], min_area: float, params: CogenerateParams) -> Layout:
+    """Cut all pairs anew; those that do not gain are left out and the rest is done again."""
+    before = _costs(layout)
+    area = layout.mesh.face_area
+    while pairs:
+        joined, parent = _joined(layout, pairs)
+        faces = np.searchsorted(parent, [p.keeps for p in pairs])
+        parcels = parcel_rings(joined, faces)
+        ranked = propose_cuts(
+            parcels,
+            min_area=min_area,
+            params=params,
+            quota=np.full(len(faces), 2),
+            thorough=True,
+        )
+        cut, done, source = insert_cuts(joined, parcels, ranked, min_area=min_area)
+        gains = _gains(
+            cut, source, faces, done, np.array([_pair_cost(p, before, area) for p in pairs])
+        )
+        if (gains >= LEAST_GAIN).all():
+            return cut
+        pairs = [p for p, gain in zip(pairs, gains, strict=True) if gain >= LEAST_GAIN]
+    return layout
+
+
+def _pair_cost(pair: _Pair, cost: FloatArray, area: FloatArray) -> float:
+    two = [pair.keeps, pair.goes]
+    return float(cost[two].sum() + _spread_cost(area[two]))
+
+
+def _spread_cost(areas: FloatArray) -> float:
+    return float(SPREAD_COST * (areas.max() / areas.min() - 1.0))
+
+
+def _gains(
+    cut: Layout, source: IntArray, faces: IntArray, done: BoolArray, before: FloatArray
+) -> FloatArray:
+    """How much each pair is better than it was; -inf where it was not cut or is not reached."""
+    cost = _costs(cut)
+    area = cut.mesh.face_area
+    reached = is_reached(cut.frontage, area)
+    out = np.full(len(faces), -np.inf)
+    for i in np.flatnonzero(done).tolist():
+        pieces = np.flatnonzero(source == faces[i])
+        if reached[pieces].all():
+            out[i] = before[i] - cost[pieces].sum() - _spread_cost(area[pieces])
+    return out
+
+
+def _joined(layout: Layout, pairs: list[_Pair]) -> tuple[Layout, npt.NDArray[np.int64]]:
+    """The layout with the chains between pairs taken away, and the face before of each face."""
+    editor = MeshEditor(layout.mesh)
+    level = layout.face_level.copy()
+    for pair in pairs:
+        ends = [editor.origin[pair.chain[0]], editor.origin[pair.chain[-1] ^ 1]]
+        editor.remove_chain(list(pair.chain))
+        level[pair.keeps] = min(level[pair.keeps], level[pair.goes]) - 1
+        for vertex in ends:
+            if editor.valence[vertex] == 2 and not layout.vertex_corner[vertex]:
+                edges = [editor.edge_parent[h >> 1] for h in editor.outgoing(vertex)]
+                if layout.edge_street[edges[0]] == layout.edge_street[edges[1]]:
+                    _straighten(editor, vertex)
+    mesh, remap = editor.commit()
+    return layout.replace(face_level=level).with_mesh(mesh, remap), remap.face
+
+
+def _straighten(editor: MeshEditor, vertex: int) -> None:
+    """Take away a vertex that lies on a straight line between its neighbours."""
+    h = editor.half_edge_of[vertex]
+    a, b = editor.origin[h ^ 1], editor.origin[editor.prev[h]]
+    ux, uy = editor.x[a] - editor.x[vertex], editor.y[a] - editor.y[vertex]
+    vx, vy = editor.x[b] - editor.x[vertex], editor.y[b] - editor.y[vertex]
+    bend = abs(ux * vy - uy * vx)
+    if ux * vx + uy * vy < 0 and bend <= 1e-6 * (ux * ux + uy * uy + vx * vx + vy * vy):
+        editor.dissolve_vertex(vertex)
