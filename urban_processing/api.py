@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy.typing as npt
@@ -12,7 +13,7 @@ from urban_processing.io.features import Source
 from urban_processing.io.frames import GeoLayout
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.pipelines import cogenerate as pipeline
-from urban_processing.progress import SILENT, Progress
+from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
 
 
@@ -75,6 +76,13 @@ def cogenerate(
         errors.append(error)
     if params is None or site is None:
         raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
+    expected = pipeline.estimate(site, params)
+    if expected.parcels > MANY_PARCELS and progress is SILENT:
+        warnings.warn(
+            f"About {expected.parcels:,} parcels: this will take about {expected.seconds:.0f} s. "
+            "Give a progress to follow it.",
+            stacklevel=2,
+        )
     return GeoLayout(pipeline.cogenerate(site, params, progress))
 
 

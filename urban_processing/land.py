@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
 
+from urban_processing.errors import BoundaryError
 from urban_processing.layout import Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
-from urban_processing.mesh.corners import STRAIGHT_ANGLE, interior_angles, sharpest_vertex
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, PlanarMesh
-from urban_processing.site import GRID, Issue, Site
+from urban_processing.mesh.corners import (
+    STRAIGHT_ANGLE,
+    interior_angles,
+    reported_polygons,
+    sharpest_vertex,
+)
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
+from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
 SIMPLIFY_SHARE = 0.3
 """Default tolerance of the simplification, in sides of the smallest parcel: notches that are
@@ -27,6 +35,19 @@ NARROW_AREA = 0.2
 HAIR = 1e-3
 """Widening of what is filled or cut off, in tolerances."""
 
+FINE_SHARE = 0.1
+"""What is finer than this share of the tolerance is left out before narrows are sought, and a
+given corner takes a vertex that lies so near."""
+
+SAME_PLACE = 1e-4
+"""A given corner takes a vertex within this share of √area at any tolerance."""
+
+CORNER_MOVED = 0.01
+"""A given corner that lay farther than this share of √area off the rim makes an issue."""
+
+TOUCH = 64 * GRID
+"""Parts may share points: boundary lines up to this length in metres are taken for one."""
+
 
 def default_tolerance(min_area: float) -> float:
     """Tolerance in metres of the simplification of a boundary for parcels of `min_area` m²."""
@@ -37,20 +58,20 @@ def simplify_site(site: Site, tolerance: float) -> Site:
     """Simplify the land's rings and say how much land changed sides.
 
     Inlets and spurs narrower than the tolerance go first; then Douglas–Peucker from the
-    sharpest corner of each ring, topology kept. Parts that would overlap others afterwards
-    stay as they are.
+    sharpest corner of each ring, or between the corners that the user gave, topology kept.
+    Parts that would meet others along a line afterwards stay as they are.
     """
     if tolerance <= 0:
         return site
-    parts = [_simplified(part, tolerance) for part in site.parts]
-    parts = _without_overlaps(list(site.parts), parts)
-    moved = sum(
-        shapely.symmetric_difference(a, b).area for a, b in zip(site.parts, parts, strict=True)
-    )
-    before = sum(shapely.get_num_coordinates(p) for p in site.parts)
-    after = sum(shapely.get_num_coordinates(p) for p in parts)
-    if after == before:
+    site = place_corners(site, near=FINE_SHARE * tolerance)
+    given = list(site.parts)
+    parts = [_simplified(part, tolerance, _own_corners(part, site.corners)) for part in given]
+    parts = _kept_apart(given, parts)
+    if all(_same_rings(a, b) for a, b in zip(given, parts, strict=True)):
         return site
+    moved = sum(shapely.symmetric_difference(a, b).area for a, b in zip(given, parts, strict=True))
+    before = sum(shapely.get_num_coordinates(p) for p in given)
+    after = sum(shapely.get_num_coordinates(p) for p in parts)
     issue = Issue(
         code="boundary_simplified",
         message=(
@@ -64,29 +85,143 @@ def simplify_site(site: Site, tolerance: float) -> Site:
     return dataclasses.replace(site, parts=tuple(parts), issues=(*site.issues, issue))
 
 
-def _simplified(part: shapely.Polygon, tolerance: float) -> shapely.Polygon:
-    """Simplify a part; where too much land would change sides, by a smaller tolerance."""
+def _same_rings(a: shapely.Polygon, b: shapely.Polygon) -> bool:
+    """Whether two polygons have the same vertices, wherever their rings begin."""
+    return bool(shapely.equals_exact(shapely.normalize(a), shapely.normalize(b)))
+
+
+def place_corners(site: Site, *, near: float = 0.0) -> Site:
+    """Put the corners that the user gave on the outer rings, as vertices.
+
+    Each goes to the nearest point of an outer ring: to the nearest vertex there if one lies
+    within `near` metres, otherwise to a vertex of its own. Corners that are vertices already
+    stay, so that placing twice changes nothing.
+    """
+    parts, corners, issues = list(site.parts), site.corners.copy(), list(site.issues)
+    for k, corner in enumerate(site.corners):
+        rims = [part.exterior for part in parts]
+        i = int(np.argmin(shapely.distance(rims, shapely.Point(corner))))
+        size = float(np.sqrt(parts[i].area))
+        parts[i], corners[k], distance = _with_vertex(
+            parts[i], corner, near=max(near, SAME_PLACE * size)
+        )
+        if distance > CORNER_MOVED * size:
+            issues.append(
+                Issue(
+                    code="corner_moved",
+                    message=(
+                        f"Given corner {k + 1} lay {distance:.3g} m off the rim of the land and "
+                        "was moved to the nearest point of it."
+                    ),
+                    part=i,
+                    value=distance,
+                    limit=CORNER_MOVED * size,
+                    geometry=shapely.Point(corners[k]),
+                )
+            )
+    return dataclasses.replace(site, parts=tuple(parts), corners=corners, issues=tuple(issues))
+
+
+def _with_vertex(
+    part: shapely.Polygon, point: FloatArray, *, near: float
+) -> tuple[shapely.Polygon, FloatArray, float]:
+    """The part with a vertex where its rim is nearest to a point; that vertex; how far it was."""
+    ring = shapely.get_coordinates(part.exterior)
+    a, edge = ring[:-1], np.diff(ring, axis=0)
+    along = np.clip(((point - a) * edge).sum(axis=1) / (edge**2).sum(axis=1), 0.0, 1.0)
+    foot = a + along[:, None] * edge
+    off = np.hypot(*(foot - point).T)
+    k = int(np.argmin(off))
+    to_vertex = np.hypot(*(a - foot[k]).T)
+    vertex = int(np.argmin(to_vertex))
+    if to_vertex[vertex] <= near:
+        return part, a[vertex], float(off[k])
+    place = snap_to_grid(foot[k])
+    shell = np.insert(ring, k + 1, place, axis=0)
+    return shapely.Polygon(shell, part.interiors), place, float(off[k])
+
+
+def _at_corners(xy: FloatArray, corners: FloatArray) -> BoolArray:
+    """(n,) which points are corners, to the last digit."""
+    z, wanted = xy[:, 0] + 1j * xy[:, 1], corners[:, 0] + 1j * corners[:, 1]
+    return np.asarray(np.isin(z, wanted), dtype=bool)
+
+
+def _own_corners(part: shapely.Polygon, corners: FloatArray) -> FloatArray:
+    """(k, 2) vertices of the part's outer ring that are corners."""
+    ring = shapely.get_coordinates(part.exterior)[:-1]
+    return np.asarray(ring[_at_corners(ring, corners)])
+
+
+def _simplified(part: shapely.Polygon, tolerance: float, corners: FloatArray) -> shapely.Polygon:
+    """Simplify a part; where too much land would change sides, by a smaller tolerance.
+
+    Narrows are sought once, on a ring without what is finer than they are: buffers of rough
+    rings take long.
+    """
+    start = _thinned(part, FINE_SHARE * tolerance, corners)
+    if start is not None:
+        start = _without_narrows(start, tolerance, corners)
+    if start is None or not _is_near(part, start):
+        start = part
     while tolerance > 1e-3 * np.sqrt(part.area):
-        simple = _simplified_once(part, tolerance)
-        if shapely.symmetric_difference(part, simple).area <= MOVED_SHARE * part.area:
+        simple = _thinned(start, tolerance, corners)
+        if simple is not None and _is_near(part, simple):
             return simple
         tolerance /= 2
     return part
 
 
-def _simplified_once(part: shapely.Polygon, tolerance: float) -> shapely.Polygon:
-    even = _without_narrows(part, tolerance)
-    rings = [_from_sharpest(ring) for ring in (even.exterior, *even.interiors)]
-    start = shapely.Polygon(rings[0], rings[1:])
-    simple = shapely.simplify(start, tolerance, preserve_topology=True)
-    simple = shapely.set_precision(simple, GRID)
-    if not isinstance(simple, shapely.Polygon) or simple.is_empty or not simple.is_valid:
-        return part
+def _is_near(part: shapely.Polygon, simple: shapely.Polygon) -> bool:
+    """Whether so little land changed sides as simplification may move."""
+    limit = MOVED_SHARE * part.area
+    # the areas alone often tell, and cost nothing
+    if abs(simple.area - part.area) > limit:
+        return False
+    return bool(shapely.symmetric_difference(part, simple).area <= limit)
+
+
+def _thinned(
+    part: shapely.Polygon, tolerance: float, corners: FloatArray
+) -> shapely.Polygon | None:
+    """Douglas–Peucker that keeps topology and corners; None where no valid polygon is left."""
+    holes = [_from_sharpest(ring) for ring in part.interiors]
+    if len(corners) == 0:
+        start = shapely.Polygon(_from_sharpest(part.exterior), holes)
+        simple = shapely.simplify(start, tolerance, preserve_topology=True)
+    else:
+        runs = _runs_between(part.exterior, corners)
+        lines = shapely.MultiLineString([*runs, *(shapely.LineString(hole) for hole in holes)])
+        # lines of one collection keep their ends and do not come to cross each other
+        thin = shapely.get_parts(shapely.simplify(lines, tolerance, preserve_topology=True))
+        shell = np.concatenate([shapely.get_coordinates(run)[:-1] for run in thin[: len(runs)]])
+        if len(shell) < 3:
+            return None
+        simple = shapely.Polygon(shell, [line.coords for line in thin[len(runs) :]])
+    simple = shapely.transform(simple, snap_to_grid)
+    if simple.is_empty or not simple.is_valid:
+        return None
+    if len(_own_corners(simple, corners)) < len(corners):
+        return None
     return shapely.orient_polygons(simple)
 
 
-def _without_narrows(part: shapely.Polygon, width: float) -> shapely.Polygon:
-    """Fill inlets and cut off spurs that are narrower than `width`; the rest stays as it is."""
+def _runs_between(ring: shapely.LinearRing, corners: FloatArray) -> list[shapely.LineString]:
+    """The runs of a ring from corner to corner, in ring order."""
+    xy = shapely.get_coordinates(ring)[:-1]
+    first, *others = np.flatnonzero(_at_corners(xy, corners)).tolist()
+    turned = np.roll(xy, -first, axis=0)
+    ends = [0, *(k - first for k in others), len(xy)]
+    closed = np.vstack([turned, turned[:1]])
+    return [shapely.LineString(closed[a : b + 1]) for a, b in itertools.pairwise(ends)]
+
+
+def _without_narrows(part: shapely.Polygon, width: float, corners: FloatArray) -> shapely.Polygon:
+    """Fill inlets and cut off spurs that are narrower than `width`; the rest stays as it is.
+
+    Inlets and spurs with a given corner stay too.
+    """
+    fixed = shapely.MultiPoint(corners)
     for sign in (1.0, -1.0):
         reach = 0.5 * width * sign
         there = part.buffer(reach, join_style="mitre", mitre_limit=MITRE_LIMIT)
@@ -95,7 +230,9 @@ def _without_narrows(part: shapely.Polygon, width: float) -> shapely.Polygon:
         narrow = [
             piece
             for piece in shapely.get_parts(changes)
-            if piece.geom_type == "Polygon" and piece.area > NARROW_AREA * width * width
+            if piece.geom_type == "Polygon"
+            and piece.area > NARROW_AREA * width * width
+            and not shapely.dwithin(piece, fixed, 2 * MITRE_LIMIT * HAIR * width)
         ]
         if not narrow:
             continue
@@ -117,32 +254,75 @@ def _from_sharpest(ring: shapely.LinearRing) -> shapely.LinearRing:
     return shapely.LinearRing(turned)
 
 
-def _without_overlaps(
+def _kept_apart(
     given: list[shapely.Polygon], simple: list[shapely.Polygon]
 ) -> list[shapely.Polygon]:
-    """Take back the simplification of parts that now overlap a neighbour."""
-    tree = shapely.STRtree(simple)
-    for i, j in tree.query(simple, predicate="intersects").T.tolist():
-        if i < j and shapely.intersection(simple[i], simple[j]).area > 0:
-            simple[i], simple[j] = given[i], given[j]
-    return simple
+    """Take back the simplification of parts that now meet a neighbour along a line.
+
+    A part taken back may meet another simplified one: this ends when none does any more.
+    """
+    parts = list(simple)
+    taken_back: set[int] = set()
+    while True:
+        meeting = {i for pair in _meeting_parts(parts) for i in pair} - taken_back
+        if not meeting:
+            return parts
+        taken_back |= meeting
+        parts = [given[i] if i in meeting else part for i, part in enumerate(parts)]
+
+
+def _meeting_parts(parts: Sequence[shapely.Polygon]) -> list[tuple[int, int]]:
+    """Pairs of parts that overlap or share a boundary line, each once and in order."""
+    polygons = np.asarray(parts, dtype=object)
+    pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects").T
+    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+    shared = shapely.intersection(polygons[pairs[:, 0]], polygons[pairs[:, 1]])
+    meeting = pairs[shapely.length(shared) > TOUCH]
+    return sorted((int(i), int(j)) for i, j in meeting)
+
+
+def check_parts(parts: Sequence[shapely.Polygon]) -> None:
+    """Make sure that the parts of the land meet at points alone.
+
+    Raises
+    ------
+    BoundaryError
+        If two parts overlap or share a boundary line.
+    """
+    pairs = _meeting_parts(parts)
+    if pairs:
+        raise BoundaryError(
+            f"Parts {i + 1} and {j + 1} of the land overlap or share a boundary line; unite them "
+            "into one polygon, as read_boundary does."
+            for i, j in pairs
+        )
 
 
 def first_layout(site: Site, *, min_area: float) -> Layout:
-    """One parcel for each part of the land; the rim is street if the site says so."""
+    """One parcel for each part of the land; the rim is street if the site says so.
+
+    Raises
+    ------
+    BoundaryError
+        If two parts overlap or share a boundary line.
+    """
+    check_parts(site.parts)
+    input_parts = site.input_parts or site.parts
+    site = place_corners(site)
     mesh = mesh_from_polygons(site.parts)
-    given = len(site.corners) > 0
-    corner = _nearest_vertices(mesh, site) if given else land_corners(mesh)
+    corner, few = _given_corners(mesh, site.corners)
+    given = len(site.corners) > 0 and len(few) < mesh.n_faces
     layout = layout_from_mesh(
         mesh,
         frame=site.frame,
         face_part=np.arange(len(site.parts)),
         min_area=min_area,
-        vertex_corner=corner,
+        vertex_corner=corner if given else land_corners(mesh),
         rim_is_street=site.rim_is_street,
     )
+    issues = _corner_issues(site, few) if len(site.corners) else []
     return layout.replace(
-        corners_given=given, issues=site.issues, input_parts=site.input_parts or site.parts
+        corners_given=given, issues=(*site.issues, *issues), input_parts=input_parts
     )
 
 
@@ -158,9 +338,46 @@ def land_corners(mesh: PlanarMesh) -> BoolArray:
     return out
 
 
-def _nearest_vertices(mesh: PlanarMesh, site: Site) -> BoolArray:
-    """(V,) rim vertices nearest to the corners that the user gave."""
+def _given_corners(mesh: PlanarMesh, corners: FloatArray) -> tuple[BoolArray, dict[int, int]]:
+    """Vertices of the outer rings that the user gave as corners, and parts with too few.
+
+    Returns
+    -------
+    corner
+        (V,) given corners; in parts with fewer than three, corners found by angle.
+    few
+        Number of given corners of the parts that have fewer than three.
+    """
     out = np.zeros(mesh.n_vertices, dtype=bool)
-    for corner in site.corners:
-        out[int(np.argmin(np.hypot(*(mesh.xy - corner).T)))] = True
-    return out
+    few: dict[int, int] = {}
+    loops = mesh.loops
+    for loop in np.flatnonzero((loops.face != OUTSIDE) & (mesh.loop_area > 0)).tolist():
+        half_edges = loops.half_edges[loops.offsets[loop] : loops.offsets[loop + 1]]
+        vertex: IntArray = mesh.origin[half_edges]
+        xy = mesh.xy[vertex]
+        is_corner = _at_corners(xy, corners)
+        if is_corner.sum() >= 3:
+            out[vertex[is_corner]] = True
+            continue
+        few[int(loops.face[loop])] = int(is_corner.sum())
+        found, _ = reported_polygons(xy, np.array([0, len(xy)]))
+        out[vertex[found]] = True
+    return out, few
+
+
+def _corner_issues(site: Site, few: dict[int, int]) -> list[Issue]:
+    """Say which parts have too few given corners."""
+    return [
+        Issue(
+            code="too_few_corners",
+            message=(
+                f"Part {part + 1} of the land has {count} given corner(s), fewer than 3: its "
+                "corners are found by angle instead."
+            ),
+            part=part,
+            value=float(count),
+            limit=3.0,
+            geometry=site.parts[part],
+        )
+        for part, count in sorted(few.items())
+    ]

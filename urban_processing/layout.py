@@ -187,7 +187,8 @@ def layout_from_mesh(
         edge_level=np.where(street, 0, -1).astype(np.int16),
         face_part=np.asarray(face_part, dtype=np.int64),
         face_level=np.zeros(n_faces, dtype=np.int64),
-        face_lineage=np.arange(1, n_faces + 1, dtype=np.uint64),
+        # far from the ranks that children are told apart by
+        face_lineage=splitmix64(np.arange(n_faces).astype(np.uint64) + np.uint64(2**32)),
         face_locked=np.zeros(n_faces, dtype=bool),
         min_area=min_area,
     )
@@ -208,7 +209,7 @@ def _child_lineage(parent: npt.NDArray[np.uint64], parent_face: IntArray) -> npt
     first = np.searchsorted(parent_face[order], parent_face)
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
-    return splitmix64(parent + (rank - first + 1).astype(np.uint64))
+    return splitmix64(parent ^ splitmix64((rank - first + 1).astype(np.uint64)))
 
 
 def _street_changes(mesh: PlanarMesh, edge_street: BoolArray) -> BoolArray:

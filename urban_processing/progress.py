@@ -64,5 +64,8 @@ class CallbackProgress:
         )
 
 
+MANY_PARCELS = 20_000
+"""The user is warned before a run that makes more parcels than this."""
+
 SILENT = CallbackProgress()
 """A progress that says nothing."""

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lands import LANDS, holed, site_of, star
 
+from urban_processing.errors import InfeasibleError
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.metrics import certificate, measure
 from urban_processing.metrics.tables import parcel_table
@@ -146,6 +147,47 @@ def test_parts_are_laid_out_apart_and_small_ones_stay_whole() -> None:
     assert layout.face_part[small.parcel_id - 1] == 2
 
 
+def test_lineages_differ_between_parts() -> None:
+    layout = run(*(shapely.box(x, 0, x + 100, 80) for x in range(0, 2000, 150)), parcels=120)
+    assert len(np.unique(layout.face_lineage)) == layout.mesh.n_faces
+
+
+def test_exact_multiple_of_the_smallest_area_is_cut() -> None:
+    layout = run(shapely.box(0, 0, 100, 100), min_area=2500, simplify=0)
+    assert layout.mesh.face_area.tolist() == [2500] * 4
+
+
+@pytest.mark.parametrize("width", [4.0, 8.0])
+def test_winding_strips_are_cut(width: float) -> None:
+    t = np.linspace(0, 6 * np.pi, 300)
+    r = 20 + 6 * t
+    spiral = shapely.LineString(np.column_stack([r * np.cos(t), r * np.sin(t)])).buffer(width / 2)
+    layout = run(spiral, parcels=40)
+    must_hold(layout)
+    assert layout.mesh.n_faces == 40
+
+
+def test_missed_number_of_parcels_is_said() -> None:
+    parts = [shapely.box(x, 0, x + 10, 10) for x in range(0, 300, 30)]
+    layout = run(*parts, parcels=4)
+    (issue,) = [i for i in layout.issues if i.code == "count_missed"]
+    assert (issue.value, issue.limit) == (10, 4)
+
+
+def test_unreached_parcels_are_listed() -> None:
+    # without a street on the rim, a strip cut across leaves parcels that no street can reach
+    site = site_of(shapely.box(0, 0, 600, 20), rim_is_street=False)
+    layout = cogenerate(site, CogenerateParams(parcels=12))
+    listed = {i.parcel_id for i in layout.issues if i.code == "parcel_not_reached"}
+    needed = np.minimum(3.0, 0.25 * np.sqrt(layout.mesh.face_area))
+    assert listed == {f + 1 for f in np.flatnonzero(layout.frontage < needed).tolist()}
+
+
+def test_too_many_parcels_are_refused() -> None:
+    with pytest.raises(InfeasibleError, match="parcels"):
+        run(shapely.box(0, 0, 1000, 1000), min_area=1e-6)
+
+
 def test_land_smaller_than_one_parcel_is_one_parcel() -> None:
     layout = run(shapely.box(0, 0, 10, 10), min_area=400)
     assert layout.mesh.n_faces == 1
@@ -189,14 +231,17 @@ def test_weight_of_regularity_lowers_irregularity(name: str) -> None:
     assert high["irregularity_mean"] < 0.85 * low["irregularity_mean"]
 
 
+ACCESS_LANDS = ("star", "triangle", "ellipse", "ell")
+
+
 def test_weight_of_access_lengthens_parcels_along_fewer_streets() -> None:
-    low = [figures(name, weight_access=0.0) for name in ("star", "square", "strip")]
-    high = [figures(name, weight_access=0.6) for name in ("star", "square", "strip")]
+    low = [figures(name, weight_access=0.0) for name in ACCESS_LANDS]
+    high = [figures(name, weight_access=0.6) for name in ACCESS_LANDS]
 
     def mean(found: list[dict[str, float]], metric: str) -> float:
         return float(np.mean([f[metric] for f in found]))
 
-    assert mean(high, "aspect") > 1.05 * mean(low, "aspect")
+    assert mean(high, "aspect") > 1.03 * mean(low, "aspect")
     assert mean(high, "street_length_relative") < mean(low, "street_length_relative")
 
 

@@ -30,7 +30,6 @@ from urban_processing.algorithms import (
     get,
     specs,
 )
-from urban_processing.algorithms.spec import MANY_PARCELS
 from urban_processing.cli.app import app, make_app
 from urban_processing.cli.summary import duration
 from urban_processing.errors import Cancelled, DependencyError, InfeasibleError
@@ -38,7 +37,7 @@ from urban_processing.io.files import read_layout
 from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams, option_name
 from urban_processing.pipelines.cogenerate import Estimate
-from urban_processing.progress import Progress
+from urban_processing.progress import MANY_PARCELS, Progress
 
 CRS = "EPSG:32632"
 LAND = shapely.box(500_000, 5_200_000, 500_160, 5_200_100)

@@ -14,15 +14,25 @@ from urban_processing.mesh.build import mesh_from_polygons
 from urban_processing.params import CogenerateParams, Preset
 from urban_processing.site import Frame
 from urban_processing.streets.access import find_accesses
-from urban_processing.streets.access_rule import ACCESS_SHARE, is_reached, required_frontage
-from urban_processing.streets.blocks import LARGEST_BLOCK, small_block_deficit, through_length
+from urban_processing.streets.access_rule import (
+    ACCESS_SHARE,
+    is_reached,
+    reached_frontage,
+    required_frontage,
+    unreached_parcels_of,
+)
+from urban_processing.streets.blocks import (
+    LARGEST_BLOCK,
+    flood_block,
+    small_block_deficit,
+    through_length,
+)
 from urban_processing.streets.ends import close_end, prune_tails, retract_ends
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.groups import group_parcels, unreached_parcels
 from urban_processing.streets.links import street_links
 from urban_processing.streets.paths import find_paths, join_cost
 from urban_processing.streets.prune import prune_streets
-from urban_processing.streets.split import flood_block
 from urban_processing.streets.state import StreetState
 
 PARAMS = CogenerateParams(parcels=10)
@@ -356,3 +366,52 @@ def test_bridge_between_two_blocks_at_a_bare_rim_stays() -> None:
     pruned = prune_streets(state.finish(level=1), PARAMS, keep_ends=True)
     assert StreetState(pruned, PARAMS).network_components()[0] == 1
     assert reached(pruned).all()
+
+
+def test_only_the_ratio_of_the_street_weights_matters() -> None:
+    for preset in Preset:
+        layouts = [
+            extend_streets(
+                make_layout(boxes(9, 7)),
+                CogenerateParams(
+                    parcels=10, preset=preset, length_weight=k, junction_weight=0.7 * k
+                ),
+                level=1,
+                keep_ends=False,
+            )
+            for k in (1.0, 10.0, 0.1)
+        ]
+        for other in layouts[1:]:
+            assert np.array_equal(other.edge_street, layouts[0].edge_street)
+
+
+def lake_layout() -> Layout:
+    """Parcels round a U-shaped lake; the parcel between its arms ends at the lake."""
+    cells = [p for k, p in enumerate(boxes(5, 5)) if k > 4 and k not in (6, 8, 11, 12, 13)]
+    west = [(0, 0), (25, 0), (25, 10), (20, 10), (10, 10), (0, 10)]
+    east = [(50 - x, y) for x, y in reversed(west)]
+    # the two vertices at x = 25 split the south side of the parcel between the arms
+    south = shapely.Polygon([(20, 10), (25, 10), (30, 10), (30, 20), (20, 20)])
+    cells[1] = south
+    return make_layout([*cells, shapely.Polygon(west), shapely.Polygon(east)])
+
+
+def test_dead_end_at_a_lake_is_led_along_the_shore_at_last() -> None:
+    layout = lake_layout()
+    extended = extend_streets(layout, PARAMS, level=1, keep_ends=False)
+    final = prune_streets(extended, PARAMS, keep_ends=False)
+    assert not (extended.edge_street & (extended.edge_kind == EdgeKind.HOLE)).any()
+    assert (final.edge_street & (final.edge_kind == EdgeKind.HOLE)).any()
+    assert reached(final).all()
+    assert not (degrees(final) == 1).any()
+    # dead ends stay where they are wanted
+    kept = prune_streets(extended, PARAMS, keep_ends=True)
+    assert not (kept.edge_street & (kept.edge_kind == EdgeKind.HOLE)).any()
+
+
+def test_unreached_parcels_are_those_below_the_published_frontage() -> None:
+    layout = make_layout(boxes(5, 5))
+    assert unreached_parcels_of(layout).tolist() == [6, 7, 8, 11, 12, 13, 16, 17, 18]
+    assert reached_frontage([4.0, 144.0, 1e4]) == pytest.approx([0.5, 3.0, 3.0])
+    done = extend_streets(layout, PARAMS, level=1, keep_ends=False)
+    assert len(unreached_parcels_of(done)) == 0

@@ -14,9 +14,6 @@ from typing import Any, Protocol
 from urban_processing.params.base import ParamField, Params
 from urban_processing.progress import Progress
 
-MANY_PARCELS = 20_000
-"""Shells warn before a run that makes more parcels than this."""
-
 
 class InputKind(enum.StrEnum):
     """What an algorithm reads; a shell knows how to ask for each kind."""

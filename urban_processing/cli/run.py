@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from urban_processing.algorithms.spec import (
-    MANY_PARCELS,
     AlgorithmSpec,
     Estimate,
     InputKind,
@@ -15,8 +14,10 @@ from urban_processing.algorithms.spec import (
 )
 from urban_processing.cli import stores
 from urban_processing.cli.call import Call, prepare
-from urban_processing.cli.summary import duration, summary
+from urban_processing.cli.summary import duration, promises_broken, summary
 from urban_processing.cli.terminal import Terminal
+from urban_processing.errors import InfeasibleError
+from urban_processing.progress import MANY_PARCELS
 
 _FILE_NAMES = {
     OutputKind.LAYOUT: "layout",
@@ -31,7 +32,8 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
     Raises
     ------
     UrbanError
-        With everything that is wrong with the call, or why the run failed.
+        With everything that is wrong with the call, why the run failed, or what of the
+        certificate does not hold.
     """
     call = prepare(spec, given)
     _say_what_inputs_say(spec, call, terminal)
@@ -50,6 +52,11 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
         if not output.of:
             rows = [*summary(output.kind, made[output.name]), *rows]
     terminal.table([*rows, *files])
+    broken = [p for o in spec.outputs if not o.of for p in promises_broken(o.kind, made[o.name])]
+    if broken:
+        raise InfeasibleError(
+            ["The layout was written, but not all that it promises holds:", *broken]
+        )
 
 
 def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) -> None:

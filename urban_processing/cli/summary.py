@@ -31,6 +31,15 @@ def summary(kind: OutputKind, made: Any) -> list[tuple[str, str]]:
     return rows
 
 
+def promises_broken(kind: OutputKind, made: Any) -> list[str]:
+    """Return what an output promises and does not hold, one sentence each."""
+    if kind is not OutputKind.LAYOUT:
+        return []
+    from urban_processing.metrics import certificate
+
+    return [check.message for check in certificate(made).failures]
+
+
 def duration(seconds: float) -> str:
     """Return a time as one would say it.
 

@@ -17,8 +17,8 @@ LONGEST = 8.0
 """A streamline longer than this many √area is given up."""
 
 TURN_LIMIT = np.radians(126.0)
-"""A streamline whose one arm turns by more than this is given up (Yang 2013, section 5,
-rejects lines that intersect themselves; both arms together may not turn by 180° and more)."""
+"""A streamline whose one arm turns by more than this is given up; both arms together may turn
+by less than 180° (Yang 2013, section 5, rejects lines that intersect themselves)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +40,8 @@ class Traces:
         (K,) ∑ zᵢ × zᵢ₊₁ along the arm.
     clearance
         (K,) least distance to the boundary away from the arm's end, in √area.
+    turned
+        (K,) angle in radians by which an arm turns, counter-clockwise positive.
     steps
         Points after the start, one entry for each step: (arms still going, their positions).
     """
@@ -52,6 +54,7 @@ class Traces:
     direction: ComplexArray
     twice_area: FloatArray
     clearance: FloatArray
+    turned: FloatArray
     steps: tuple[tuple[IntArray, ComplexArray], ...]
 
     def paths(self, arms: IntArray) -> list[ComplexArray]:
@@ -179,6 +182,7 @@ class _Tracer:
             direction=self.d,
             twice_area=self.twice_area,
             clearance=self._clearance(clearance_span, rooted),
+            turned=self.turned,
             steps=tuple(self.steps),
         )
 

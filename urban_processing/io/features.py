@@ -110,6 +110,8 @@ def _must_exist(path: str) -> None:
     virtual = "://" in path or path.startswith("/vsi")
     if not virtual and not Path(path).exists():
         raise BoundaryError(f"The file {path} does not exist.")
+    if Path(path).is_dir() and Path(path).suffix.lower() != ".gdb":
+        raise BoundaryError(f"{path} is a folder: give the file in it.")
 
 
 def _read_parquet(path: str, layer: str | None, where: str | None) -> Features:

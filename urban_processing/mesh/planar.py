@@ -153,6 +153,21 @@ class PlanarMesh:
         """Half-edges around the (outer) loop of a face."""
         return self.loops.ring(int(self.face_loop[face]))
 
+    def face_rings(self, faces: IntArray | None = None) -> tuple[IntArray, IntArray]:
+        """Half-edges of the (outer) loops of faces, all by default, as one ragged array.
+
+        Returns
+        -------
+        half_edges, offsets
+            The loop of the i-th face is ``half_edges[offsets[i]:offsets[i + 1]]``.
+        """
+        loops = self.loops
+        loop = self.face_loop if faces is None else self.face_loop[faces]
+        count = loops.offsets[loop + 1] - loops.offsets[loop]
+        offsets = np.append(0, np.cumsum(count))
+        step = np.arange(int(offsets[-1])) - np.repeat(offsets[:-1], count)
+        return loops.half_edges[np.repeat(loops.offsets[loop], count) + step], offsets
+
     def face_polygons(self, offset: tuple[float, float] = (0.0, 0.0)) -> npt.NDArray[np.object_]:
         """(F,) shapely polygons of the faces, shifted by `offset`."""
         loops = self.loops

@@ -15,7 +15,7 @@ from urban_processing.mesh.corners import (
     reported_polygons,
     ring_neighbours,
 )
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 
 REACHED_M = 3.0
 REACHED_SHARE = 0.25
@@ -104,7 +104,7 @@ def reached_frontage(area: npt.ArrayLike) -> FloatArray:
 def measure_parcels(layout: Layout) -> ParcelMeasures:
     """Measure every parcel of a layout; nothing is looped over in Python."""
     mesh = layout.mesh
-    half_edges, offsets = outer_rings(mesh)
+    half_edges, offsets = mesh.face_rings()
     xy = mesh.xy[mesh.origin[half_edges]]
     corners, corner_offsets = reported_polygons(xy, offsets)
     corner_xy = xy[corners]
@@ -134,15 +134,6 @@ def measure_parcels(layout: Layout) -> ParcelMeasures:
         reached=layout.frontage >= enough,
         through=_through_lots(corner_xy, corner_offsets, side_frontage, enough),
     )
-
-
-def outer_rings(mesh: PlanarMesh) -> tuple[IntArray, IntArray]:
-    """Half-edges of the outer loop of each face, as ragged rings."""
-    loops = mesh.loops
-    size = np.diff(loops.offsets)[mesh.face_loop]
-    offsets = np.append(0, np.cumsum(size))
-    within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], size)
-    return loops.half_edges[np.repeat(loops.offsets[mesh.face_loop], size) + within], offsets
 
 
 def inscribed_thinness(polygons: npt.NDArray[np.object_], area: FloatArray) -> FloatArray:

@@ -9,15 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance, first_layout, simplify_site
 from urban_processing.layout import Layout, Step
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.planar import BoolArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.pipelines.findings import findings
+from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
-from urban_processing.site import Issue, Site
+from urban_processing.site import Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
+from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
 from urban_processing.subdivision.recut import recut_irregular
@@ -29,8 +33,8 @@ MEAN_OVER_MIN = 1.37
 FLOOR_SHARE = 0.6
 """Smallest area allowed where the number of parcels is given, over their mean area."""
 
-VERY_LARGE = 3.0
-"""Parcels above so many smallest areas are listed in the issues."""
+MOST_PARCELS = 2_000_000
+"""More parcels than this are refused: the run would take hours and all the memory."""
 
 SECONDS_PER_PARCEL = 1.2e-3
 """For the estimate that is given before a long run; one core of a common machine."""
@@ -77,7 +81,7 @@ class State:
         can = self.active & ~self.layout.face_locked & (mesh.face_n_loops == 1)
         if self.quota is not None:
             return np.flatnonzero(can & (self.quota >= 2))
-        return np.flatnonzero(can & (mesh.face_area >= 2.0 * self.min_area))
+        return np.flatnonzero(can & (mesh.face_area >= 2.0 * self.min_area * (1.0 - AREA_ROUNDING)))
 
     @property
     def finished(self) -> bool:
@@ -107,8 +111,13 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         With `issues` for what could not be done and a `history` entry for this run.
     """
     started = time.perf_counter()
-    state = begin(site, params)
     goal = estimate(site, params).parcels
+    if goal > MOST_PARCELS:
+        raise InfeasibleError(
+            f"This would make about {goal:,} parcels; more than {MOST_PARCELS:,} do not fit into "
+            "one run. Give a larger smallest area, fewer parcels, or lay out districts apart."
+        )
+    state = begin(site, params)
     while not state.finished:
         done = math.log2(state.layout.mesh.n_faces + 1) / math.log2(goal + 2)
         progress.update(min(done, 1.0) ** 3, _message(state))
@@ -144,8 +153,7 @@ def smallest_area(site: Site, params: CogenerateParams) -> float:
     """Smallest area in m² that a cut may leave."""
     if params.min_area is not None:
         return params.min_area
-    assert params.parcels is not None
-    return FLOOR_SHARE * site.area / params.parcels
+    return FLOOR_SHARE * site.area / (params.parcels or 1)
 
 
 def begin(site: Site, params: CogenerateParams) -> State:
@@ -156,10 +164,10 @@ def begin(site: Site, params: CogenerateParams) -> State:
         mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
         tolerance = default_tolerance(mean / MEAN_OVER_MIN)
     layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
-    quota = None if params.parcels is None else _shared_out(layout.mesh.face_area, params.parcels)
+    quota = None if params.parcels is None else shared_out(layout.mesh.face_area, params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)
     if quota is not None:
-        quota = _divided(quota, parent, layout.mesh.face_area)
+        quota = divided(quota, parent, layout.mesh.face_area)
     state = State(
         layout=layout,
         params=params,
@@ -188,38 +196,11 @@ def step(state: State) -> State:
     if state.quota is not None:
         kept = state.quota.copy()
         kept[faces[~cut]] = 1
-        quota = _divided(kept, parent, layout.mesh.face_area)
+        quota = divided(kept, parent, layout.mesh.face_area)
     after = dataclasses.replace(
         state, layout=layout, active=active, quota=quota, level=state.level + 1
     )
     return dataclasses.replace(after, layout=_with_streets(after, layout))
-
-
-def _shared_out(area: FloatArray, total: int) -> IntArray:
-    """Divide a number of parcels over areas in proportion, at least one each."""
-    exact = area * (total / area.sum())
-    quota: IntArray = np.maximum(np.floor(exact).astype(np.int64), 1)
-    missing = total - int(quota.sum())
-    if missing > 0:
-        order = np.argsort(np.round(quota - exact, 9), kind="stable")
-        quota[order[:missing]] += 1
-    while missing < 0 and (quota > 1).any():
-        # parts too small for a parcel still are one: the others give way
-        rest = np.where(quota > 1, exact / quota, np.inf)
-        quota[int(np.argmin(rest))] -= 1
-        missing += 1
-    return quota
-
-
-def _divided(quota: IntArray, parent: IntArray, area: FloatArray) -> IntArray:
-    """Divide the quotas of cut faces over their pieces in proportion to the area."""
-    order = np.argsort(parent, kind="stable")
-    start = np.flatnonzero(np.diff(parent[order], prepend=-1))
-    out = quota[parent]
-    for pieces in np.split(order, start[1:]):
-        if len(pieces) > 1:
-            out[pieces] = _shared_out(area[pieces], int(quota[parent[pieces[0]]]))
-    return out
 
 
 def _with_streets(state: State, layout: Layout) -> Layout:
@@ -258,45 +239,4 @@ def finish(state: State) -> Layout:
         min_area = float(layout.mesh.face_area[whole].min(initial=np.inf))
         min_area = min_area if math.isfinite(min_area) else state.min_area
     layout = layout.replace(min_area=min_area)
-    return layout.replace(issues=(*layout.issues, *_size_issues(layout)))
-
-
-def _size_issues(layout: Layout) -> list[Issue]:
-    """Parts too small for a parcel, and parcels that stayed very large."""
-    area, least = layout.mesh.face_area, layout.min_area
-    small = np.flatnonzero(area < least)
-    large = np.flatnonzero(area > VERY_LARGE * least)
-    if len(small) + len(large) == 0:
-        return []
-    polygons = layout.mesh.face_polygons()
-
-    def issue(face: int, code: str, message: str, limit: float) -> Issue:
-        return Issue(
-            code=code,
-            message=message,
-            part=int(layout.face_part[face]),
-            parcel_id=face + 1,
-            value=float(area[face]),
-            limit=limit,
-            geometry=polygons[face],
-        )
-
-    return [
-        issue(
-            f,
-            "part_below_min_area",
-            f"This part of the land ({area[f]:.0f} m²) is smaller than the smallest parcel "
-            f"allowed ({least:.0f} m²) and stays one parcel.",
-            least,
-        )
-        for f in small.tolist()
-    ] + [
-        issue(
-            f,
-            "parcel_not_cut",
-            f"No cut of this parcel ({area[f]:.0f} m²) leaves two simple halves of at least "
-            f"{least:.0f} m².",
-            VERY_LARGE * least,
-        )
-        for f in large.tolist()
-    ]
+    return layout.replace(issues=(*layout.issues, *findings(layout, params)))

@@ -6,7 +6,6 @@ import heapq
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from urban_processing.streets.paths import UNCLOSED_COST
 from urban_processing.streets.state import FAR, StreetState
 
 MISSED = 2.0
@@ -94,7 +93,7 @@ def _way(
     for last in (chains[-1], first ^ 1):
         stuck = not state.ahead[last] and not state.aside[last]
         if stuck and not state.degree[state.end[last]]:
-            way += UNCLOSED_COST
+            way += state.unclosed_cost
     return way
 
 
@@ -177,6 +176,6 @@ def _any_access(state: StreetState, group: Sequence[int]) -> list[Access]:
     for f in group:
         open_ = [i for i in state.around[f] if state.usable[i] and not state.street[i]]
         if open_:
-            longest = max(open_, key=lambda i: (state.length[i], -i))
+            longest = max(open_, key=lambda i: (state.size[i], -i))
             return [Access((0.0,), (longest,))]
     return []

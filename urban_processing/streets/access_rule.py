@@ -1,14 +1,22 @@
-"""The one rule that says when a parcel is reached by a street."""
+"""When a parcel is reached by a street, and the stricter goal of street generation."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from urban_processing.mesh.planar import BoolArray, FloatArray
+from urban_processing.layout import Layout
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+
+REACHED_M = 3.0
+REACHED_SHARE = 0.25
+"""A parcel is reached from this frontage on: `REACHED_M`, or this share of √area if less."""
+
+MEASURED_M = 1e-6
+"""Precision in metres of a measured frontage: coordinates are kept to the micrometre."""
 
 ACCESS_SHARE = 0.25
-"""Frontage that a reached parcel has at least, as a share of the square root of its area."""
+"""Frontage that street generation gives every parcel, as a share of the square root of its area."""
 
 
 def required_frontage(area: npt.ArrayLike) -> FloatArray:
@@ -23,3 +31,15 @@ def required_frontage(area: npt.ArrayLike) -> FloatArray:
 def is_reached(frontage: npt.ArrayLike, area: npt.ArrayLike) -> BoolArray:
     """Return whether parcels with `frontage` (m) on streets and `area` (m²) are reached."""
     return np.asarray(np.asarray(frontage, dtype=np.float64) >= required_frontage(area))
+
+
+def reached_frontage(area: npt.ArrayLike) -> FloatArray:
+    """Frontage in metres from which parcels of `area` m² are reached: min(3 m, 0.25·√area)."""
+    side = np.sqrt(np.asarray(area, dtype=np.float64))
+    return np.asarray(np.minimum(REACHED_M, REACHED_SHARE * side))
+
+
+def unreached_parcels_of(layout: Layout) -> IntArray:
+    """Faces of the parcels of a layout that no street reaches, by `reached_frontage`."""
+    enough = reached_frontage(layout.mesh.face_area) - MEASURED_M
+    return np.flatnonzero(layout.frontage < enough)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from urban_processing.mesh.planar import OUTSIDE
-from urban_processing.streets.state import StreetState
+from urban_processing.streets.state import StreetState, quantised
 
 SMALL_BLOCK = 5
 """Blocks of fewer parcels are charged for each parcel that they lack."""
@@ -27,33 +28,40 @@ def layout_cost(state: StreetState, chains: Sequence[int]) -> float:
     """Cost of the blocks and through lots that the new street `chains` make."""
     if state.rules.small_block == 0.0:
         return 0.0
-    small = state.rules.small_block * small_block_deficit(state, chains)
-    return small + THROUGH_COST * through_length(state, chains)
+    small = quantised(state.rules.small_block) * small_block_deficit(state, chains)
+    return small + quantised(THROUGH_COST * through_length(state, chains))
 
 
 def small_block_deficit(state: StreetState, chains: Sequence[int]) -> int:
     """Count the parcels that the blocks beside `chains` have less than `SMALL_BLOCK`."""
     deficit = 0
-    face, around, street = state.face, state.around, state.street
+    face = state.face
     done: set[int] = set()
     for chain in chains:
         for first in (face[chain], face[chain ^ 1]):
             if first == OUTSIDE or first in done:
                 continue
-            block = [first]
-            seen = {first}
-            for f in block:
-                for i in around[f]:
-                    if not street[i]:
-                        g = face[i ^ 1]
-                        if g != OUTSIDE and g not in seen:
-                            seen.add(g)
-                            block.append(g)
-                if len(block) >= SMALL_BLOCK:
-                    break
-            done |= seen
+            block = flood_block(state, first, enough=SMALL_BLOCK)
+            done |= block
             deficit += max(0, SMALL_BLOCK - len(block))
     return deficit
+
+
+def flood_block(state: StreetState, first: int, *, enough: float = math.inf) -> set[int]:
+    """Parcels of the block that a parcel belongs to; at least `enough` of a larger one."""
+    face, around, street = state.face, state.around, state.street
+    block = {first}
+    front = [first]
+    for f in front:
+        for i in around[f]:
+            if not street[i]:
+                g = face[i ^ 1]
+                if g != OUTSIDE and g not in block:
+                    block.add(g)
+                    front.append(g)
+        if len(front) >= enough:
+            break
+    return block
 
 
 def through_length(state: StreetState, chains: Sequence[int]) -> float:

@@ -8,10 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.streets.blocks import layout_cost
 from urban_processing.streets.ends import close_end
-from urban_processing.streets.paths import UNCLOSED_COST, find_paths, join_cost
+from urban_processing.streets.paths import find_paths, join_cost
 from urban_processing.streets.state import StreetState
 
 
@@ -37,7 +36,7 @@ def lay_access(
         Cost of all that was added; infinite where the access could not be connected.
     """
     nodes = [state.start[chains[0]]] + [state.end[i] for i in chains]
-    has_network = _part_has_streets(state, chains[0])
+    has_network = state.part_has_streets[state.part_of(chains[0])]
     touches = any(state.degree[v] for v in nodes)
     mark = len(state.journal)
     cost = _cost_of(state, chains)
@@ -54,7 +53,7 @@ def lay_access(
             if state.degree[node] == 1:
                 way = close_end(state, node)
                 if way is None:
-                    cost += UNCLOSED_COST
+                    cost += state.unclosed_cost
                 else:
                     connected = True
                     cost += _add(state, way)
@@ -86,11 +85,6 @@ def _cost_of(state: StreetState, chains: Sequence[int]) -> float:
     return cost
 
 
-def _part_has_streets(state: StreetState, chain: int) -> bool:
-    face = state.face[chain] if state.face[chain] != OUTSIDE else state.face[chain ^ 1]
-    return state.part_has_streets[state.part[face]]
-
-
 def path_to_network(
     state: StreetState, chains: Sequence[int], *, bound: float = math.inf
 ) -> tuple[float, list[int]] | None:
@@ -117,7 +111,7 @@ def join_components(state: StreetState) -> None:
     n_components, label = state.network_components()
     parts: dict[int, int] = {}
     for node in np.flatnonzero(label >= 0).tolist():
-        parts.setdefault(int(label[node]), _part_of(state, node))
+        parts.setdefault(int(label[node]), state.part_of(state.out[node][0]))
     if n_components == len(set(parts.values())):
         return
     members = np.bincount(label[label >= 0], minlength=n_components)
@@ -143,9 +137,3 @@ def _join(state: StreetState, nodes: list[int]) -> None:
     for _, path in find_paths(state, starts, own):
         for i in path:
             state.add(i)
-
-
-def _part_of(state: StreetState, node: int) -> int:
-    chain = state.out[node][0]
-    face = state.face[chain] if state.face[chain] != OUTSIDE else state.face[chain ^ 1]
-    return state.part[face]

@@ -88,13 +88,20 @@ def retract_ends(state: StreetState) -> None:
     may well end there.
     """
     for node in dead_ends(state):
-        while state.degree[node] == 1:
-            chain = street_into(state, node)
-            beside = max(state.face[chain], state.face[chain ^ 1])
-            if not state.interior[chain] or not state.part_has_street_rim[state.part[beside]]:
-                break
-            state.remove(chain)
-            node = state.start[chain]
+        retract_end(state, node)
+
+
+def retract_end(state: StreetState, node: int) -> list[int]:
+    """Take back one dead end as far as `retract_ends` does; return its chains."""
+    removed = []
+    while state.degree[node] == 1:
+        chain = street_into(state, node)
+        if not state.interior[chain] or not state.part_has_street_rim[state.part_of(chain)]:
+            break
+        state.remove(chain)
+        removed.append(chain)
+        node = state.start[chain]
+    return removed
 
 
 def prune_tails(state: StreetState) -> None:

@@ -8,6 +8,7 @@ from urban_processing.streets.connect import join_components
 from urban_processing.streets.ends import close_ends, prune_tails, retract_ends
 from urban_processing.streets.groups import group_parcels, unreached_parcels
 from urban_processing.streets.reach import reach_group
+from urban_processing.streets.settle import settle_ends
 from urban_processing.streets.split import split_blocks
 from urban_processing.streets.state import StreetState
 
@@ -62,6 +63,7 @@ def extend_streets(
     join_components(state)
     if not keep_ends:
         close_ends(state)
+        settle_ends(state, along_holes=False)
         if state.rules.small_block:
             split_blocks(state)
     return state.finish(level=level)

@@ -17,9 +17,6 @@ JOG_COST = 1.0
 JOG_DISTANCE = 0.6
 """Distance of junctions in parcel sides below which streets across look like a jog."""
 
-UNCLOSED_COST = 1e4
-"""Cost in parcel sides of an end that cannot be led on though dead ends are not wanted."""
-
 SPREAD = 1.5
 EXTRA = 3.0
 """Alternative paths cost at most `SPREAD` times the best plus `EXTRA` parcel sides."""
@@ -55,7 +52,7 @@ def find_paths(
     """Find the cheapest paths from chains to the street network.
 
     Dijkstra's algorithm on the directed chains, so that each turn is charged exactly where
-    it is made.
+    it is made. Of paths that cost the same, that of the lower chains comes first.
 
     Parameters
     ----------

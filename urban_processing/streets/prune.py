@@ -7,6 +7,7 @@ from urban_processing.params import CogenerateParams
 from urban_processing.streets.blocks import LARGEST_BLOCK
 from urban_processing.streets.ends import close_ends, is_spare, prune_tails
 from urban_processing.streets.links import link_cost, stands_free, street_links
+from urban_processing.streets.settle import settle_ends
 from urban_processing.streets.state import StreetState
 
 
@@ -14,7 +15,8 @@ def prune_streets(layout: Layout, params: CogenerateParams, *, keep_ends: bool) 
     """Take back redundant dead ends and links of the street network, for good.
 
     A street goes where all parcels stay reached, the network stays connected, no block of
-    more than `LARGEST_BLOCK` parcels arises, and, unless `keep_ends`, no dead end.
+    more than `LARGEST_BLOCK` parcels arises, and, unless `keep_ends`, no dead end. Where a dead
+    end has no other way on it is led along a hole, such as the shore of a lake.
 
     Parameters
     ----------
@@ -29,6 +31,7 @@ def prune_streets(layout: Layout, params: CogenerateParams, *, keep_ends: bool) 
     prune_tails(state)
     if not keep_ends:
         close_ends(state)
+        settle_ends(state, along_holes=True)
     prune_links(state)
     return state.finish(level=int(layout.edge_level.max(initial=0)))
 

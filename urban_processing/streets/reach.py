@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from urban_processing.streets.access import MISSED, Access, find_accesses
 from urban_processing.streets.connect import lay_access
-from urban_processing.streets.paths import UNCLOSED_COST
 from urban_processing.streets.state import StreetState
 
 LAST_RESORT = 40
@@ -33,7 +32,7 @@ def reach_group(
         for count in (state.rules.look_ahead, LAST_RESORT):
             accesses = find_accesses(state, group, distance, keep_ends=keep_ends, count=count)
             cost, streets = _cheapest(state, group, accesses, keep_ends=keep_ends)
-            if cost < UNCLOSED_COST:
+            if cost < state.unclosed_cost:
                 break
         total += cost
         if not streets:

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from urban_processing.mesh.planar import OUTSIDE
-from urban_processing.streets.blocks import LARGEST_BLOCK, layout_cost
+from urban_processing.streets.blocks import LARGEST_BLOCK, flood_block, layout_cost
 from urban_processing.streets.paths import find_paths, join_cost
-from urban_processing.streets.state import StreetState
+from urban_processing.streets.state import StreetState, quantised
 
 SMALLEST_HALF = 5
 """Number of parcels that both halves of a split block have at least."""
@@ -38,20 +37,6 @@ def split_blocks(state: StreetState) -> None:
             state.add(i)
         half = flood_block(state, state.face[path[0]])
         blocks += [part for part in (half, block - half) if len(part) > LARGEST_BLOCK]
-
-
-def flood_block(state: StreetState, first: int) -> set[int]:
-    """Parcels of the block that a parcel belongs to."""
-    face, street = state.face, state.street
-    block = {first}
-    front = [first]
-    for f in front:
-        for i in state.around[f]:
-            g = face[i ^ 1]
-            if not street[i] and g != OUTSIDE and g not in block:
-                block.add(g)
-                front.append(g)
-    return block
 
 
 def _best_split(state: StreetState, block: set[int]) -> list[int] | None:
@@ -94,4 +79,4 @@ def _imbalance(state: StreetState, block: set[int], path: list[int]) -> float:
     other = len(block) - half
     if min(half, other) < SMALLEST_HALF:
         return math.inf
-    return cost + IMBALANCE_COST * abs(half - other) / len(block)
+    return cost + quantised(IMBALANCE_COST * abs(half - other) / len(block))

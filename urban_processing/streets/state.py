@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from itertools import pairwise
 
@@ -19,8 +20,16 @@ STRAIGHT = math.radians(45.0)
 """Two chains are collinear while the turn between them is less, that is, while their included
 angle is more than 135° (Chen 2024, section 4.2)."""
 
+QUANTUM = 2.0**-30
+"""Costs are multiples of this, about 1e-9 parcel sides: their sums are exact, so that what costs
+the same compares equal, and a rounding error never decides which street is laid."""
+
 FAR = 1e9
 """Distance of nodes from which no street can be reached."""
+
+UNCLOSED_COST = 1e4
+"""Cost of an end that cannot be led on though dead ends are not wanted, in parcel sides or turns,
+whichever cost more."""
 
 
 class StreetState:
@@ -28,8 +37,9 @@ class StreetState:
 
     Everything is indexed by the directed chains, nodes and faces of the layout's corner
     graph; lists instead of arrays, because the searches touch a few elements at a time.
-    Lengths called `size` are in parcel sides (the square root of the mean parcel area) times
-    the length weight: the unit of all costs.
+    Lengths called `size` are in parcel sides (the square root of the mean parcel area). What a
+    street of one parcel side costs is the unit of all costs: the size of a chain is the cost of
+    its length, and `turn_cost` the ratio of the weights of junctions and length.
     """
 
     def __init__(self, layout: Layout, params: CogenerateParams) -> None:
@@ -38,7 +48,8 @@ class StreetState:
         self.layout = layout
         self.graph = graph
         self.rules = params.rules
-        self.turn_cost = params.junction_weight
+        self.turn_cost = quantised(params.junction_weight / params.length_weight)
+        self.unclosed_cost = UNCLOSED_COST * max(1.0, self.turn_cost)
         self.side = math.sqrt(float(mesh.face_area.mean()))
         interior = layout.chain_kind == EdgeKind.INTERIOR
         usable = interior | layout.chain_street
@@ -49,7 +60,8 @@ class StreetState:
         self.end: list[int] = graph.end.tolist()
         self.face: list[int] = graph.face.tolist()
         self.length: list[float] = graph.length.tolist()
-        self.size: list[float] = (graph.length * (params.length_weight / self.side)).tolist()
+        size = np.round(graph.length / (self.side * QUANTUM)) * QUANTUM
+        self.size: list[float] = size.tolist()
         self.out = _ragged(graph.out, graph.out_offsets)
         self.around = _ragged(graph.around, graph.around_offsets)
         self.ahead, self.aside, self.follow = _successors(graph, usable)
@@ -99,6 +111,22 @@ class StreetState:
             if face != OUTSIDE:
                 self.frontage[face] += length
 
+    def part_of(self, chain: int) -> int:
+        """Part of the land that a chain lies in."""
+        # OUTSIDE is less than every face
+        return self.part[max(self.face[chain], self.face[chain ^ 1])]
+
+    def with_lake_sides(self) -> StreetState:
+        """Return a view of this state in which streets may also run along holes.
+
+        It shares the streets, so that what is laid in the view is laid here.
+        """
+        view = copy.copy(self)
+        usable = np.array(self.usable) | (self.layout.chain_kind == EdgeKind.HOLE)
+        view.usable = usable.tolist()
+        view.ahead, view.aside, view.follow = _successors(self.graph, usable)
+        return view
+
     def is_reached(self, face: int) -> bool:
         """Whether a parcel has the frontage it needs, or all that it can have."""
         return self.frontage[face] >= self.need[face]
@@ -114,7 +142,8 @@ class StreetState:
         if not len(sources):
             return [0.0] * graph.n_nodes
         ok = np.flatnonzero(np.array(self.usable))
-        weights = np.array(self.size)[ok] + 1e-12
+        # a link of weight zero would be none
+        weights = np.maximum(np.array(self.size)[ok], QUANTUM)
         links = coo_matrix(
             (weights, (graph.start[ok], graph.end[ok])), shape=(graph.n_nodes, graph.n_nodes)
         )
@@ -178,6 +207,11 @@ class StreetState:
         return layout.replace(edge_street=edge_street, edge_level=edge_level)
 
 
+def quantised(cost: float) -> float:
+    """Round a cost to a multiple of `QUANTUM`."""
+    return round(cost / QUANTUM) * QUANTUM
+
+
 def _ragged(values: IntArray, offsets: IntArray) -> list[list[int]]:
     flat: list[int] = values.tolist()
     return [flat[a:b] for a, b in pairwise(offsets.tolist())]
@@ -194,8 +228,9 @@ def _successors(
     after = graph.out[first + np.arange(len(before))]
     keep = (after != before ^ 1) & usable[after] & usable[before]
     before, after = before[keep], after[keep]
-    cosine = (graph.leaving[after] * graph.arriving[before].conj()).real
-    straight = cosine > math.cos(STRAIGHT)
+    # rounded, so that the chain's index decides between equal turns
+    cosine = np.round((graph.leaving[after] * graph.arriving[before].conj()).real, 9)
+    straight = cosine > round(math.cos(STRAIGHT), 9)
     follow = np.full(n, -1)
     order = np.lexsort((cosine, before))
     order = order[straight[order]]

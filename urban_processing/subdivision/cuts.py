@@ -17,6 +17,9 @@ from urban_processing.subdivision.parcels import Boundary
 CLEARANCE = 0.18
 """A cut nearer than this many √area to the boundary leaves a sliver."""
 
+AREA_ROUNDING = 1e-9
+"""Share by which rounding may take an area below the smallest one allowed."""
+
 SATELLITE = 0.12
 """Distance in √area of the seeds beside the centroid."""
 
@@ -199,6 +202,8 @@ def streamline_cuts(
     backward = forward + 2 * free
     rooted = 4 * free + np.arange(n_root)
     ok = (arms.edge[forward] >= 0) & (arms.edge[backward] >= 0)
+    # backward arms run the other way: their turn counts against that of the forward ones
+    ok &= np.abs(arms.turned[forward] - arms.turned[backward]) < np.pi
     forward, backward = forward[ok], backward[ok]
     inside = field.distances(seeds.root_parcel, inner) > 0.25 * STEP
     ok_root = (arms.edge[rooted] >= 0) & inside

@@ -1,31 +1,60 @@
-"""First cuts of land with holes: they go through the holes, so that every parcel has one ring."""
+"""First cuts of land with holes: they go through the holes, so that every parcel has one ring.
+
+A cut runs from the outer ring through one hole or several to the outer ring again, so it always
+parts the land in two. Every cut is tried on the parcel's polygon alone and drawn only if all its
+pieces are valid and large enough; otherwise the layout stays as it was.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from urban_processing.fields.rings import ComplexArray, cross
 from urban_processing.layout import Layout
-from urban_processing.mesh.edit import MeshEditor
-from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray, PlanarMesh
-from urban_processing.site import Issue
+from urban_processing.mesh.build import mesh_from_polygons
+from urban_processing.mesh.edit import MeshEditor, Remap
+from urban_processing.mesh.planar import FloatArray, IntArray, PlanarMesh
+from urban_processing.site import GRID, Issue
 
-DIRECTIONS = 12
-"""Number of directions, over 180°, that a cut through a hole is tried in."""
+DIRECTIONS = 24
+"""Number of directions, over 360°, that a cut leaves a hole in."""
 
 SNAP = 0.02
-"""The far end of such a cut moves to a vertex within this many √area of the parcel."""
+"""An end of a cut moves to a vertex within this many √area of the parcel…"""
+
+SNAP_OF_EDGE = 0.3
+"""… if it is also within this share of the edge that it lies on."""
+
+NO_SNAP = 1e-6
+"""Distance in √area within which a vertex counts as met exactly."""
+
+BEND_COST = 1.5
+"""Cost, in √area of length, of a right-angled bend of a cut within its hole."""
+
+MOST_HOLES = 8
+"""A parcel stays whole if so many of its holes, the largest first, cannot be cut."""
+
+MOST_TRIES = 150
+"""Number of cuts that are tried from one point within a hole."""
+
+AREA_ROUNDING = 1e-9
+"""Share of a parcel's area that its pieces may differ from it by rounding."""
+
+Polygons = npt.NDArray[np.object_]
 
 
 def cut_through_holes(layout: Layout, *, min_area: float) -> tuple[Layout, IntArray]:
     """Cut parcels along straight lines through their holes until each has one ring.
 
-    Of the directions tried, the one with the shortest cuts that meet the far boundary squarely
-    is taken, if no half falls below `min_area`. Parcels that are too small to be cut keep
-    their holes, as do those where no direction serves: these are listed in the issues.
+    Of the cuts tried, the one with the shortest and straightest lines that meet the outer ring
+    squarely is taken, if no piece falls below `min_area`. Parcels smaller than two of
+    `min_area` keep their holes, as do those that no cut serves: these are locked and listed in
+    the issues. All parcels are valid polygons, and no edge has one parcel on both sides.
 
     Returns
     -------
@@ -35,213 +64,270 @@ def cut_through_holes(layout: Layout, *, min_area: float) -> tuple[Layout, IntAr
     parent = np.arange(layout.mesh.n_faces)
     while True:
         mesh = layout.mesh
-        ringed = (mesh.face_n_loops > 1) | (_slits(layout) > 0)
-        eligible = ringed & (mesh.face_area >= 2 * min_area) & ~layout.face_locked
-        if not eligible.any():
+        large = mesh.face_area >= 2 * min_area
+        eligible = np.flatnonzero((mesh.face_n_loops > 1) & large & ~layout.face_locked)
+        if len(eligible) == 0:
             return layout, parent
-        face = int(np.flatnonzero(eligible)[0])
-        cut = _cut_one(layout, face, min_area)
+        face = int(eligible[0])
+        cut = _find_cut(mesh, face, min_area)
         if cut is None:
-            issue = Issue(
-                code="hole_not_cut",
-                message="No straight cut through a hole leaves parcels large enough; "
-                "the parcel stays whole.",
-                part=int(layout.face_part[face]),
-                parcel_id=face + 1,
-                geometry=mesh.face_polygons()[face],
-            )
-            locked = layout.face_locked.copy()
-            locked[face] = True
-            layout = layout.replace(face_locked=locked, issues=(*layout.issues, issue))
+            layout = _locked(layout, face)
         else:
-            layout, source = cut
+            layout, source = _drawn(layout, face, cut)
             parent = parent[source]
 
 
-def _slits(layout: Layout) -> IntArray:
-    """(F,) number of edges that have the same face on both sides."""
-    sides = layout.mesh.face.reshape(-1, 2)
-    own = sides[sides[:, 0] == sides[:, 1], 0]
-    return np.bincount(own, minlength=layout.mesh.n_faces)
+def _locked(layout: Layout, face: int) -> Layout:
+    """Keep a parcel with its holes and say so."""
+    issue = Issue(
+        code="hole_not_cut",
+        message="No straight cut through a hole leaves parcels large enough; "
+        "the parcel stays whole.",
+        part=int(layout.face_part[face]),
+        parcel_id=face + 1,
+        geometry=layout.mesh.face_polygons()[face],
+    )
+    locked = layout.face_locked.copy()
+    locked[face] = True
+    return layout.replace(face_locked=locked, issues=(*layout.issues, issue))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """The edges of one face: n half-edges from a to b, each with the loop it belongs to."""
+
+    polygon: shapely.Polygon
+    half_edge: IntArray
+    ring: IntArray
+    a: ComplexArray
+    b: ComplexArray
+    outer: int
+    scale: float
 
 
 @dataclass(frozen=True)
-class _Ray:
-    """A straight cut from a vertex of the hole to the boundary seen from there."""
+class _End:
+    """An end of a segment: a place on a side, which is one of its vertices if `new` is false."""
 
-    vertex: int
-    half_edge: int
+    side: int
     point: complex
-    length: float
-    skew: float
+    new: bool
 
 
-def _cut_one(layout: Layout, face: int, min_area: float) -> tuple[Layout, IntArray] | None:
-    """Cut a face through its largest hole; None if no direction is legal.
+@dataclass(frozen=True)
+class _Chain:
+    """Segments from a hole, by way of others perhaps, to the outer ring; cost in √area."""
 
-    A hole gets cuts in two opposite directions. Where two holes are joined by both of theirs,
-    or one leads into the other, the face still touches itself along a slit: then a single
-    further cut is made from one of its holes.
-    """
-    scale = float(np.sqrt(layout.mesh.face_area[face]))
-    n_slits = int(_slits(layout)[face])
-    for rays in _options(layout, face, scale):
-        cut = _drawn(layout, face, rays, SNAP * scale)
-        if cut is None or not _legal(layout, cut[0], min_area):
-            continue
-        pieces = np.flatnonzero(cut[1] == face)
-        if layout.mesh.face_n_loops[face] > 1 or int(_slits(cut[0])[pieces].sum()) < n_slits:
-            return cut
+    segments: tuple[tuple[_End, _End], ...]
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """The ends on sides that are new vertices, by half-edge, and the pieces of the face."""
+
+    new_vertices: tuple[tuple[int, complex], ...]
+    pieces: Polygons
+
+
+def _find_cut(mesh: PlanarMesh, face: int, min_area: float) -> _Cut | None:
+    """Best legal cut through a hole of a face, the largest hole first; None if there is none."""
+    sides = _sides(mesh, face)
+    own = np.unique(sides.ring)
+    holes = own[own != sides.outer]
+    largest = holes[np.argsort(mesh.loop_area[holes], kind="stable")][:MOST_HOLES]
+    for hole in largest.tolist():
+        touches = _touches(sides, hole)
+        for anchor in _anchors(sides, hole):
+            for snap in (SNAP, NO_SNAP):
+                chains = [
+                    _chain(sides, hole, anchor, complex(d), snap * sides.scale)
+                    for d in np.exp(2j * np.pi * np.arange(DIRECTIONS) / DIRECTIONS)
+                ]
+                for segments in _options(chains, alone=touches):
+                    cut = _tried(sides, segments, min_area)
+                    if cut is not None:
+                        return cut
     return None
 
 
-def _options(layout: Layout, face: int, scale: float) -> list[tuple[_Ray, ...]]:
-    """Pairs of opposite rays from a hole, or single ones from joined holes; best first."""
-    mesh = layout.mesh
-    loops = mesh.loops
-    z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
-    segments = np.flatnonzero(mesh.face == face)
-    directions = np.exp(1j * np.pi * np.arange(2 * DIRECTIONS) / DIRECTIONS)
-    paired = mesh.face_n_loops[face] > 1
-    if paired:
-        own = np.flatnonzero(
-            (loops.face == face) & (np.arange(len(loops.face)) != mesh.face_loop[face])
-        )
-        holes = [int(own[np.argmax(np.abs(mesh.loop_area[own]))])]
-    else:
-        hole = (mesh.loop_area > 0) & (loops.face == OUTSIDE)
-        at_face = np.zeros(mesh.n_vertices, dtype=bool)
-        at_face[mesh.origin[segments]] = True
-        holes = [
-            i for i in np.flatnonzero(hole).tolist() if at_face[mesh.origin[loops.ring(i)]].any()
-        ]
-    options: list[tuple[float, int, tuple[_Ray, ...]]] = []
-    for hole_loop in holes:
-        vertices = mesh.origin[loops.ring(hole_loop)]
-        rays = [_ray(z, vertices, segments, mesh, complex(d)) for d in directions]
-        for k, ray in enumerate(rays):
-            back = rays[(k + DIRECTIONS) % len(rays)] if paired else None
-            if ray is None or (paired and (back is None or back.vertex == ray.vertex)):
-                continue
-            both = (ray,) if back is None else (ray, back)
-            cost = sum(r.length / scale + r.skew for r in both)
-            options.append((round(cost, 9), len(options), both))
-    return [rays for _, _, rays in sorted(options, key=lambda o: o[:2])]
+def _sides(mesh: PlanarMesh, face: int) -> _Sides:
+    half_edge = np.flatnonzero(mesh.face == face)
+    z = _complex(mesh.xy)
+    return _Sides(
+        polygon=mesh.face_polygons()[face],
+        half_edge=half_edge,
+        ring=mesh.loops.of_half_edge[half_edge],
+        a=z[mesh.origin[half_edge]],
+        b=z[mesh.target[half_edge]],
+        outer=int(mesh.face_loop[face]),
+        scale=float(np.sqrt(mesh.face_area[face])),
+    )
 
 
-def _ray(
-    z: ComplexArray,
-    vertices: IntArray,
-    segments: IntArray,
-    mesh: PlanarMesh,
-    direction: complex,
-) -> _Ray | None:
-    """Shoot from the hole's farthest vertex in a direction."""
-    heights: FloatArray = (z[vertices] * np.conj(direction)).real
-    vertex = int(vertices[int(np.argmax(np.round(heights, 6)))])
-    origin, target = mesh.origin[segments], mesh.target[segments]
-    a, b = z[origin], z[target]
-    away = (origin != vertex) & (target != vertex)
-    e = b - a
+def _touches(sides: _Sides, hole: int) -> bool:
+    """Whether a hole meets another ring of the face at a point."""
+    own = sides.ring == hole
+    return bool(np.isin(sides.a[own], sides.a[~own]).any())
+
+
+def _anchors(sides: _Sides, hole: int) -> list[complex]:
+    """Points within a hole that cuts start from: its centre, then some towards its vertices."""
+    start = np.flatnonzero(sides.ring == hole)
+    following = {complex(sides.a[i]): complex(sides.b[i]) for i in start.tolist()}
+    ring = [complex(sides.a[start[0]])]
+    while len(ring) < len(following):
+        ring.append(following[ring[-1]])
+    z = np.array(ring)
+    polygon = shapely.Polygon(np.column_stack([z.real, z.imag]))
+    inner = shapely.point_on_surface(polygon)
+    points = [complex(p.x, p.y) for p in (polygon.centroid, inner)]
+    some = z[np.unique(np.linspace(0, len(z), 4, endpoint=False).astype(np.int64))]
+    points += [0.4 * points[0] + 0.6 * complex(v) for v in some]
+    unique = dict.fromkeys(points)
+    return [p for p in unique if shapely.contains_xy(polygon, p.real, p.imag)]
+
+
+def _chain(
+    sides: _Sides, hole: int, anchor: complex, direction: complex, snap: float
+) -> _Chain | None:
+    """Follow a ray from within a hole to the outer ring; None if it meets no outer ring.
+
+    Where the ray comes back to a ring that it has met before, what lies between is left out,
+    so that no ring is met twice by segments.
+    """
+    e = sides.b - sides.a
     ray = np.full(len(e), direction)
     denominator = cross(ray, e)
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = cross(a - z[vertex], e) / denominator
-        s = cross(a - z[vertex], ray) / denominator
-    hits = away & (denominator > 0) & (t > 0) & (s >= 0) & (s <= 1)
-    if not hits.any():
+        t = cross(sides.a - anchor, e) / denominator
+        s = cross(sides.a - anchor, ray) / denominator
+    hits = np.flatnonzero((denominator != 0) & (t > 0) & (s >= 0) & (s <= 1))
+    hits = hits[np.lexsort((hits, t[hits]))]
+    at_outer = np.flatnonzero(sides.ring[hits] == sides.outer)
+    if len(at_outer) == 0:
         return None
-    i = int(np.argmin(np.where(hits, t, np.inf)))
-    square = abs(float(cross(ray[i : i + 1], e[i : i + 1] / np.abs(e[i : i + 1]))[0]))
-    point = complex(a[i] + s[i] * e[i])
-    return _Ray(vertex, int(segments[i]), point, float(t[i]), 1.0 - square)
+    hits = hits[: at_outer[0] + 1]
+    last = {int(r): i for i, r in enumerate(sides.ring[hits].tolist())}
+    i = last.get(hole, -1)
+    segments, length = [], 0.0
+    while 0 <= i < len(hits) - 1:
+        ends = _end(sides, int(hits[i]), s, snap), _end(sides, int(hits[i + 1]), s, snap)
+        if ends[0].point != ends[1].point:
+            segments.append(ends)
+            length += abs(ends[1].point - ends[0].point)
+        i = last[int(sides.ring[hits[i + 1]])]
+    far = int(hits[-1])
+    skew = 1.0 - abs(float(denominator[far])) / abs(complex(e[far]))
+    return _Chain(tuple(segments), length / sides.scale + skew) if segments else None
 
 
-def _drawn(
-    layout: Layout, face: int, rays: tuple[_Ray, ...], snap: float
-) -> tuple[Layout, IntArray] | None:
-    """Draw the cuts; the loops of the face that fall to the new side follow it."""
+def _end(sides: _Sides, side: int, s: FloatArray, snap: float) -> _End:
+    """The place at share s of a side, on the grid, or a vertex of the side that is near."""
+    a, b = complex(sides.a[side]), complex(sides.b[side])
+    z = a + float(s[side]) * (b - a)
+    near = min(snap, SNAP_OF_EDGE * abs(b - a))
+    for vertex in (a, b):
+        if abs(z - vertex) <= near:
+            return _End(side, vertex, new=False)
+    z = complex(round(z.real / GRID) * GRID, round(z.imag / GRID) * GRID)
+    return _End(side, z, new=z not in (a, b))
+
+
+def _options(
+    chains: list[_Chain | None], *, alone: bool
+) -> Iterator[tuple[tuple[_End, _End], ...]]:
+    """Pairs of chains, best first; single ones too from a hole that touches another ring."""
+    options: list[tuple[float, int, tuple[tuple[_End, _End], ...]]] = []
+    for k, first in enumerate(chains):
+        if first is None:
+            continue
+        if alone:
+            options.append((round(first.cost, 9), len(options), first.segments))
+        for j in range(k + 1, len(chains)):
+            second = chains[j]
+            if second is None:
+                continue
+            bend = abs(j - k - DIRECTIONS / 2) / (DIRECTIONS / 4)
+            cost = first.cost + second.cost + BEND_COST * bend
+            options.append((round(cost, 9), len(options), first.segments + second.segments))
+    for _, _, segments in sorted(options, key=lambda o: o[:2])[:MOST_TRIES]:
+        yield segments
+
+
+def _tried(sides: _Sides, segments: tuple[tuple[_End, _End], ...], min_area: float) -> _Cut | None:
+    """Cut the polygon of a face; None unless all pieces are valid, large and have fewer holes."""
+    ends = [end for segment in segments for end in segment if end.new]
+    added = sorted(
+        {
+            (e.side, abs(e.point - complex(sides.a[e.side])), e.point.real, e.point.imag)
+            for e in ends
+        }
+    )
+    at = np.array([i for i, *_ in added], dtype=np.int64)
+    points = np.array([complex(x, y) for *_, x, y in added], dtype=np.complex128)
+    tails = np.insert(sides.a, at + 1, points)
+    heads = np.insert(sides.b, at, points)
+    cuts = np.array([[p.point, q.point] for p, q in segments])
+    lines = _lines(np.vstack([np.column_stack([tails, heads]), cuts]))
+    polygon = sides.polygon
+    found = shapely.get_parts(shapely.polygonize(lines))
+    pieces = found[shapely.intersects(polygon, shapely.point_on_surface(found))]
+    area = shapely.area(pieces)
+    rings = shapely.get_rings(pieces)
+    # every side belongs to one piece and every segment of the cut to two of them
+    n_lines = int((shapely.get_num_coordinates(rings) - 1).sum())
+    n_holes = int(shapely.get_num_interior_rings(pieces).sum())
+    if (
+        len(pieces) < 2
+        or float(area.min()) < min_area
+        or n_holes >= shapely.get_num_interior_rings(polygon)
+        or n_lines != len(tails) + 2 * len(cuts)
+        or abs(float(area.sum()) - polygon.area) > AREA_ROUNDING * polygon.area
+        or not shapely.is_valid(pieces).all()
+        or not shapely.coverage_is_valid(pieces)
+    ):
+        return None
+    vertices = tuple((int(sides.half_edge[i]), complex(p)) for i, p in zip(at, points, strict=True))
+    return _Cut(vertices, pieces)
+
+
+def _lines(ends: ComplexArray) -> Polygons:
+    """(n,) segments between (n, 2) complex points."""
+    return np.asarray(shapely.linestrings(np.stack([ends.real, ends.imag], axis=-1)))
+
+
+def _drawn(layout: Layout, face: int, cut: _Cut) -> tuple[Layout, IntArray]:
+    """The layout with a face replaced by its pieces, and the face before of each face."""
     editor = MeshEditor(layout.mesh)
-    ends = [_end_vertex(editor, layout, ray, snap) for ray in rays]
-    if len(set(ends)) < len(ends):
-        return None
-    for ray, end in zip(rays, ends, strict=True):
-        start = _leaving_towards(editor, ray.vertex, end, face)
-        stop = _leaving_towards(editor, end, ray.vertex, face)
-        if start is None or stop is None:
-            return None
-        new = editor.connect(start, stop, [])
-        if new >= 0:
-            _reassign_loops(editor, face, new)
-    mesh, remap = editor.commit()
-    return layout.with_mesh(mesh, remap), remap.face
+    # of several vertices on one half-edge the farthest comes first: it keeps its origin
+    for half_edge, point in reversed(cut.new_vertices):
+        editor.split_edge(half_edge, point.real, point.imag)
+    noded = layout.with_mesh(*editor.commit())
+    n_faces = layout.mesh.n_faces
+    polygons = noded.mesh.face_polygons()
+    polygons[face] = cut.pieces[0]
+    mesh = mesh_from_polygons([*polygons, *cut.pieces[1:]])
+    source = np.append(np.arange(n_faces), np.full(len(cut.pieces) - 1, face))
+    return noded.with_mesh(mesh, _remap(noded.mesh, mesh, source)), source
 
 
-def _end_vertex(editor: MeshEditor, layout: Layout, ray: _Ray, snap: float) -> int:
-    """Vertex at the far end of a cut: one that is near, or a new one."""
-    h = ray.half_edge
-    # an edge already split for the other cut: find the piece that holds the point
-    last = int(layout.mesh.target[h])
-    start = _at(editor, editor.origin[h])
-    reach = abs(ray.point - start)
-    while editor.origin[h ^ 1] != last and abs(_at(editor, editor.origin[h ^ 1]) - start) < reach:
-        h = editor.next[h]
-    for vertex in (editor.origin[h], editor.origin[h ^ 1]):
-        if abs(_at(editor, vertex) - ray.point) < snap and vertex != ray.vertex:
-            return vertex
-    return editor.origin[editor.split_edge(h, ray.point.real, ray.point.imag)]
+def _remap(before: PlanarMesh, after: PlanarMesh, source: IntArray) -> Remap:
+    """Where vertices and edges come from, by their coordinates."""
+    vertex_at = {z: i for i, z in enumerate(_complex(before.xy).tolist())}
+    edge_at = {key: i for i, key in enumerate(_edge_keys(before))}
+    return Remap(
+        vertex=np.array([vertex_at.get(z, -1) for z in _complex(after.xy).tolist()]),
+        edge=np.array([edge_at.get(key, -1) for key in _edge_keys(after)]),
+        face=source,
+    )
 
 
-def _at(editor: MeshEditor, vertex: int) -> complex:
-    return complex(editor.x[vertex], editor.y[vertex])
+def _complex(xy: FloatArray) -> ComplexArray:
+    return np.asarray(xy[:, 0] + 1j * xy[:, 1])
 
 
-def _leaving_towards(editor: MeshEditor, vertex: int, towards: int, face: int) -> int | None:
-    """The half-edge that leaves a vertex such that the direction lies in the face beside it."""
-    at = _at(editor, vertex)
-    way = _at(editor, towards) - at
-    for h in editor.outgoing(vertex):
-        if editor.face[h] != face:
-            continue
-        ahead = _at(editor, editor.origin[h ^ 1]) - at
-        back = _at(editor, editor.origin[editor.prev[h]]) - at
-        opening = np.angle(back / ahead) % (2 * np.pi) or 2 * np.pi
-        if np.angle(way / ahead) % (2 * np.pi) < opening:
-            return h
-    return None
-
-
-def _reassign_loops(editor: MeshEditor, face: int, new: int) -> None:
-    """Give the loops that lie in the new face (holes not yet cut) to it."""
-    seen: set[int] = set()
-    outer: list[int] = []
-    others: list[list[int]] = []
-    for h, f in enumerate(editor.face):
-        if f not in (face, new) or h in seen or not editor.is_edge(h):
-            continue
-        ring = editor.ring(h)
-        seen.update(ring)
-        xy = editor.coordinates(ring)
-        area = np.sum(xy[:, 0] * np.roll(xy[:, 1], -1) - xy[:, 1] * np.roll(xy[:, 0], -1))
-        if f == new and area > 0:
-            outer = ring
-        elif area < 0:
-            others.append(ring)
-    shell = shapely.Polygon(editor.coordinates(outer))
-    for ring in others:
-        inside = shapely.contains_xy(shell, *editor.coordinates(ring[:1])[0])
-        for h in ring:
-            editor.face[h] = new if inside else face
-
-
-def _legal(before: Layout, after: Layout, min_area: float) -> bool:
-    """Whether the new faces are large enough and simple."""
-    mesh = after.mesh
-    n_before = before.mesh.n_faces
-    touched = np.ones(mesh.n_faces, dtype=bool)
-    touched[:n_before] = mesh.face_area[:n_before] != before.mesh.face_area
-    large = mesh.face_area[touched] >= min_area
-    simple = shapely.is_valid(mesh.face_polygons()[touched])
-    # while holes are being joined, a ring may touch itself along a slit
-    joined = (mesh.face_n_loops > 1) | (_slits(after) > 0)
-    return bool(large.all() and (simple | joined[touched]).all())
+def _edge_keys(mesh: PlanarMesh) -> list[frozenset[complex]]:
+    """The two ends of each edge in either order."""
+    ends = _complex(mesh.xy)[mesh.origin].reshape(-1, 2)
+    return [frozenset(pair) for pair in ends.tolist()]

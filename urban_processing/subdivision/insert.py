@@ -12,7 +12,8 @@ import shapely
 from urban_processing.layout import Layout
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.site import snap_to_grid
+from urban_processing.site import GRID, snap_to_grid
+from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.parcels import ParcelRings
 from urban_processing.subdivision.streamline import Cut
 
@@ -22,6 +23,9 @@ T-junctions in a brick pattern become crossings."""
 
 VERTEX_SNAP = 0.02
 """A cut's end moves, within this many √area, to a vertex of the ring that is no corner."""
+
+LEAST_CLEARANCE = 32 * GRID
+"""Half-parcels narrower than this somewhere (m) could be turned over by rounding."""
 
 PATH_TOLERANCE = 0.006
 """Streamlines are simplified by this share of √area before they are inserted."""
@@ -224,7 +228,11 @@ def _legal_rings(points: list[FloatArray], min_area: float) -> BoolArray:
     polygons = shapely.polygons(rings)
     signed = shapely.is_ccw(rings)
     return np.asarray(
-        shapely.is_valid(polygons) & (shapely.area(polygons) >= min_area) & signed, dtype=bool
+        shapely.is_valid(polygons)
+        & (shapely.area(polygons) >= min_area * (1.0 - AREA_ROUNDING))
+        & (shapely.minimum_clearance(polygons) > LEAST_CLEARANCE)
+        & signed,
+        dtype=bool,
     )
 
 

@@ -52,10 +52,10 @@ class ParcelRings:
     node: BoolArray
     inward: ComplexArray
 
-    def chunks(self, budget: int) -> list[IntArray]:
-        """Parcels sorted by ring length and grouped so that a padded group stays small."""
+    def chunks(self, budget: int, among: IntArray) -> list[IntArray]:
+        """Some parcels, sorted by ring length and grouped so that a padded group stays small."""
         count = np.diff(self.offsets)
-        order = np.argsort(count, kind="stable")
+        order = among[np.argsort(count[among], kind="stable")]
         groups: list[IntArray] = []
         start = 0
         while start < len(order):
@@ -72,12 +72,7 @@ class ParcelRings:
 def parcel_rings(layout: Layout, faces: IntArray) -> ParcelRings:
     """Gather the rings of the given faces, each of which has one loop."""
     mesh = layout.mesh
-    loops = mesh.loops
-    loop = mesh.face_loop[faces]
-    count = loops.offsets[loop + 1] - loops.offsets[loop]
-    offsets = np.append(0, np.cumsum(count))
-    step = np.arange(int(offsets[-1])) - np.repeat(offsets[:-1], count)
-    h = loops.half_edges[np.repeat(loops.offsets[loop], count) + step]
+    h, offsets = mesh.face_rings(faces)
     vertex = mesh.origin[h]
     xy = mesh.xy[vertex]
     node = (mesh.valence[vertex] > 2) | layout.vertex_corner[vertex]
@@ -97,16 +92,20 @@ def parcel_rings(layout: Layout, faces: IntArray) -> ParcelRings:
 def _ring_corners(layout: Layout, xy: FloatArray, offsets: IntArray, vertex: IntArray) -> BoolArray:
     """Corners of the approximate polygons: found on the shape, or from those given."""
     out = np.zeros(len(xy), dtype=bool)
-    if layout.corners_given:
-        given = layout.vertex_corner[vertex]
-        ends = np.flatnonzero(given | (layout.mesh.valence[vertex] > 2))
-        counts = np.searchsorted(ends, offsets)
-        if (np.diff(counts) >= 3).all():
-            corners, _ = thin_corners(xy, ends, counts, keep=given[ends])
-            out[corners] = True
-            return out
     corners, _ = reported_polygons(xy, offsets)
     out[corners] = True
+    if not layout.corners_given:
+        return out
+    given = layout.vertex_corner[vertex]
+    ends = np.flatnonzero(given | (layout.mesh.valence[vertex] > 2))
+    count = np.diff(np.searchsorted(ends, offsets))
+    ring = np.repeat(np.arange(len(count)), np.diff(offsets))
+    enough = count >= 3
+    out[enough[ring]] = False
+    ends = ends[enough[ring[ends]]]
+    if len(ends):
+        kept, _ = thin_corners(xy, ends, np.append(0, np.cumsum(count[enough])), keep=given[ends])
+        out[kept] = True
     return out
 
 

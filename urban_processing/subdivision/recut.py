@@ -65,10 +65,9 @@ def recut_irregular(layout: Layout, *, min_area: float, params: CogenerateParams
 def _costs(layout: Layout) -> FloatArray:
     """(F,) irregularity of each parcel, and what it costs not to have four sides."""
     mesh = layout.mesh
-    loops = mesh.loops
-    rings = [loops.ring(int(i)) for i in mesh.face_loop]
-    xy = mesh.xy[mesh.origin[np.concatenate(rings)]]
-    corners, offsets = reported_polygons(xy, np.append(0, np.cumsum([len(r) for r in rings])))
+    half_edges, ring_offsets = mesh.face_rings()
+    xy = mesh.xy[mesh.origin[half_edges]]
+    corners, offsets = reported_polygons(xy, ring_offsets)
     irregularity = polygon_irregularity(xy[corners], offsets)
     return np.asarray(irregularity + SIDES_COST * (np.diff(offsets) != 4))
 

@@ -11,16 +11,21 @@ from urban_processing.hashing import UintArray, uniform
 from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS, STRAIGHT_ANGLE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.subdivision.cuts import CLEARANCE, Cuts
+from urban_processing.subdivision.cuts import AREA_ROUNDING, CLEARANCE, Cuts
 from urban_processing.subdivision.parcels import CONTINUES_ANGLE, Boundary
-from urban_processing.subdivision.prospect import prospect_of_area, prospect_of_quota
+from urban_processing.subdivision.prospect import (
+    prospect_of_area,
+    prospect_of_quota,
+    side_irregularity,
+)
 
 ALTERNATIVES = 4
 """Number of ranked cuts kept for each parcel."""
 
 SPREAD = 0.08
-"""d_ε (Yang 2013, section 5) in √area: of two cuts whose ends are both nearer than this, the
-better one is kept."""
+"""In √area: of two cuts whose ends are both nearer than this, the better one is kept. It stands
+for the spacing d_ε of Yang 2013, section 5, which prunes seeds one streamline at a time; here
+all streamlines of all parcels are traced together and pruned afterwards."""
 
 
 QUOTA_WEIGHT = 2.0
@@ -30,25 +35,21 @@ QUOTA_WEIGHT = 2.0
 BEYOND_CAP = 0.1
 """Share of Qsize that still tells equal halves from those at the cap."""
 
+STRETCH = 2.0
+"""A weight w of the orientation makes parcels of 1 + `STRETCH` · w, long over short side, ideal
+where their long side lies in the preferred direction."""
+
 OWN_SHARE = 0.2
 """Weight of the present proportions of a half that is still to be cut."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredCuts:
-    """Candidates after snapping, with their quality; `quality` is -inf where a cut is illegal.
-
-    Areas are shares of the parcel's area; ``area`` is that of the half to the left of a → b.
-    """
+    """Candidates after snapping, with their quality; `quality` is -inf where a cut is illegal."""
 
     cuts: Cuts
     t_a: FloatArray
     t_b: FloatArray
-    area: FloatArray
-    irregularity: FloatArray
-    """(C, 2) irregularity of the left and the right half."""
-    reached: BoolArray
-    """(C, 2) whether the left and the right half keep a street access."""
     quality: FloatArray
 
 
@@ -82,8 +83,9 @@ def score_cuts(
     ring_part = boundary.twice_area_between(cuts.parcel, t_b, t_a)
     area = 0.5 * (cuts.bulge + cross(a, b) + ring_part)
     smaller, larger = np.minimum(area, 1.0 - area), np.maximum(area, 1.0 - area)
-    left = _half(boundary, cuts.parcel, a, b, t_a, t_b)
-    right = _half(boundary, cuts.parcel, b, a, t_b, t_a)
+    preferred, stretch = _preferred(boundary, cuts.parcel, params)
+    left = _half(boundary, cuts.parcel, a, b, t_a, t_b, preferred, stretch)
+    right = _half(boundary, cuts.parcel, b, a, t_b, t_a, preferred, stretch)
     street = np.column_stack(
         [
             boundary.street_between(cuts.parcel, t_b, t_a),
@@ -112,13 +114,14 @@ def score_cuts(
         ends = _continues(boundary, cuts.parcel, node_a, cuts.leaving).astype(np.float64)
         ends += _continues(boundary, cuts.parcel, node_b, -cuts.arriving)
         quality += params.continuity * 0.5 * ends
-    if params.orientation is not None:
-        quality += params.weight_orientation * _oriented(
-            boundary, cuts.parcel, b - a, params.orientation
-        )
+    if params.orientation is not None and rules.prospect == 0:
+        along = _oriented(b - a, preferred)
+        quality += params.weight_orientation * along
     if rules.variation > 0:
         quality += rules.variation * _noise(cuts.parcel, lineage, params.seed)
-    legal = (smaller >= min_share[cuts.parcel]) & (left.n >= 3) & (right.n >= 3)
+    legal = (
+        (smaller >= min_share[cuts.parcel] * (1.0 - AREA_ROUNDING)) & (left.n >= 3) & (right.n >= 3)
+    )
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
@@ -126,9 +129,6 @@ def score_cuts(
         cuts,
         t_a,
         t_b,
-        area,
-        np.column_stack([left.irregularity, right.irregularity]),
-        reached,
         quality,
     )
 
@@ -194,13 +194,21 @@ def _continues(
     return np.asarray((inward * np.conj(wanted)).real > np.cos(CONTINUES_ANGLE))
 
 
-def _oriented(
-    boundary: Boundary, parcel: IntArray, chord: ComplexArray, orientation: float
-) -> FloatArray:
+def _preferred(
+    boundary: Boundary, parcel: IntArray, params: CogenerateParams
+) -> tuple[ComplexArray, float]:
+    """Preferred direction of long sides in each parcel's frame, and the stretch across it."""
+    if params.orientation is None:
+        return np.ones(len(parcel), dtype=np.complex128), 1.0
+    direction = np.exp(1j * np.radians(params.orientation))
+    stretch = 1.0 + STRETCH * params.weight_orientation
+    return np.asarray(direction * np.conj(boundary.rings.axis[parcel])), stretch
+
+
+def _oriented(chord: ComplexArray, preferred: ComplexArray) -> FloatArray:
     """1 where a cut runs along the preferred direction, 0 across (Chen 2024, section 6)."""
-    wanted = np.exp(1j * np.radians(orientation)) * np.conj(boundary.rings.axis[parcel])
     length = np.abs(chord)
-    along = (chord * np.conj(wanted)).real / np.where(length > 0, length, 1.0)
+    along = (chord * np.conj(preferred)).real / np.where(length > 0, length, 1.0)
     return np.asarray(1.0 - 2.0 / np.pi * np.arccos(np.clip(np.abs(along), 0.0, 1.0)))
 
 
@@ -208,8 +216,8 @@ def _oriented(
 class _Half:
     """Approximate polygons of one half of each candidate.
 
-    `aspect` is the mean of two opposite sides over that of the other two; 0 where the polygon
-    is no quadrilateral.
+    `aspect` is the mean of two opposite sides over that of the other two, seen with the stretch
+    of a preferred orientation; 0 where the polygon is no quadrilateral.
     """
 
     irregularity: FloatArray
@@ -226,7 +234,7 @@ class _Half:
             prospect_of_quota(folded, quota),
             prospect_of_area(folded, np.maximum(content, 1.0)),
         )
-        own = self.irregularity - self.by_angle
+        own = side_irregularity(folded)
         uncut = np.where(quota > 0, quota < 2, content < 2.0)
         shown = np.where(uncut, own, later + OWN_SHARE * own)
         return np.asarray(
@@ -241,6 +249,8 @@ def _half(
     b: ComplexArray,
     t_a: FloatArray,
     t_b: FloatArray,
+    preferred: ComplexArray,
+    stretch: float,
 ) -> _Half:
     """Approximate polygon of the half that goes a, b, ring, a.
 
@@ -267,7 +277,7 @@ def _half(
         [a[:, None], b[:, None], np.take_along_axis(corner_z[parcel], k, axis=1)], axis=1
     )
     z, n = _thinned(z, count + 2)
-    return _measured(z, n)
+    return _measured(z, n, preferred, stretch)
 
 
 def _run_start(between: BoolArray, number: IntArray, count: IntArray) -> IntArray:
@@ -312,7 +322,7 @@ def _turns(z: ComplexArray, n: IntArray) -> FloatArray:
     return np.asarray(np.angle((after - z) * np.conj(z - before)))
 
 
-def _measured(z: ComplexArray, n: IntArray) -> _Half:
+def _measured(z: ComplexArray, n: IntArray, preferred: ComplexArray, stretch: float) -> _Half:
     """Eq. 1 and the proportions of padded polygons."""
     _, after = _neighbours(z, n)
     valid = np.arange(z.shape[1])[None] < n[:, None]
@@ -326,7 +336,10 @@ def _measured(z: ComplexArray, n: IntArray) -> _Half:
     aspect = np.zeros(len(z))
     if z.shape[1] > 3:
         quad = np.flatnonzero((n == 4) & (side[:, :4].min(axis=1) > 0))
-        aspect[quad] = (side[quad, 0] + side[quad, 2]) / (side[quad, 1] + side[quad, 3])
+        # seen in a plane that is stretched across the preferred direction
+        turned = (after[quad, :4] - z[quad, :4]) * np.conj(preferred[quad])[:, None]
+        seen = np.hypot(turned.real, stretch * turned.imag)
+        aspect[quad] = (seen[:, 0] + seen[:, 2]) / (seen[:, 1] + seen[:, 3])
     return _Half(
         irregularity=g_angle * by_angle + g_side * by_side / safe**2,
         by_angle=g_angle * by_angle,

@@ -17,7 +17,7 @@ from urban_processing.mesh.corners import (
     ring_areas,
 )
 from urban_processing.mesh.edit import MeshEditor
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray
 
 SHORT_SHARE = 0.2
 """An edge is short below this share of the mean side of either parcel (Chen 2024, 4.1)."""
@@ -62,7 +62,8 @@ def remove_short_edges(layout: Layout, *, min_area: float) -> Layout:
 def _short_chains(layout: Layout) -> list[list[int]]:
     """Chains of half-edges that are too short, the shortest first."""
     graph = layout.corner_graph
-    xy, offsets = _face_rings(layout)
+    half_edges, offsets = layout.mesh.face_rings()
+    xy = layout.mesh.xy[layout.mesh.origin[half_edges]]
     corners, corner_offsets = reported_polygons(xy, offsets)
     side = mean_side_length(xy[corners], corner_offsets)
     with_outside = np.append(side, np.inf)
@@ -72,17 +73,6 @@ def _short_chains(layout: Layout) -> list[list[int]]:
     short = short[np.argsort(np.round(ratio[short], 9), kind="stable")]
     o = graph.offsets
     return [graph.half_edges[o[2 * i] : o[2 * i + 1]].tolist() for i in short]
-
-
-def _face_rings(layout: Layout) -> tuple[FloatArray, IntArray]:
-    """Outer rings of all faces as ragged coordinates."""
-    mesh = layout.mesh
-    loops = mesh.loops
-    count = (loops.offsets[1:] - loops.offsets[:-1])[mesh.face_loop]
-    offsets = np.append(0, np.cumsum(count))
-    step = np.arange(int(offsets[-1])) - np.repeat(offsets[:-1], count)
-    h = loops.half_edges[np.repeat(loops.offsets[mesh.face_loop], count) + step]
-    return mesh.xy[mesh.origin[h]], offsets
 
 
 class _Merger:

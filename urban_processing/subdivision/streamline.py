@@ -12,6 +12,7 @@ from urban_processing.fields.rings import ComplexArray, RingBatch
 from urban_processing.mesh.corners import simplified_vertices
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.subdivision.chords import chord_cuts
 from urban_processing.subdivision.cuts import (
     Cuts,
     halving_cuts,
@@ -24,6 +25,9 @@ from urban_processing.subdivision.score import ScoredCuts, rank_cuts, score_cuts
 
 FIELD_TOLERANCE = 0.004
 """The field sees rings simplified by this share of √area: collinear vertices cost time."""
+
+GRID_SIZES = (18, 26, 48)
+"""Grid of the field for rings of at most 8, at most 16, and of more vertices."""
 
 HALVED_BELOW = 3.2
 """Parcels below this many smallest areas also get straight cuts that halve them exactly."""
@@ -77,11 +81,15 @@ def propose_cuts(
         More seeds, a finer field and no snapping, for parcels whose first cuts failed.
     """
     out: list[list[Cut]] = [[] for _ in range(len(parcels.face))]
-    few = len(parcels.face) < 16
-    size = 48 if few or thorough else 24 if len(parcels.face) < 128 else 18
     field_vertices = simplified_vertices(parcels.xy, parcels.offsets, FIELD_TOLERANCE)
     quotas = np.zeros(len(parcels.face), dtype=np.int64) if quota is None else quota
-    for rows in parcels.chunks(16 * 64):
+    sizes = _grid_sizes(parcels, field_vertices, thorough=thorough)
+    groups = [
+        (rows, int(size))
+        for size in np.unique(sizes)
+        for rows in parcels.chunks(16 * 64, np.flatnonzero(sizes == size))
+    ]
+    for rows, size in groups:
         boundary = boundaries(parcels, rows)
         cuts = _candidates(
             parcels,
@@ -109,6 +117,13 @@ def propose_cuts(
     return out
 
 
+def _grid_sizes(parcels: ParcelRings, kept: IntArray, *, thorough: bool) -> IntArray:
+    """(P,) grid of the field: a parcel's own, so that its cut does not depend on the others."""
+    count = np.diff(np.searchsorted(kept, parcels.offsets))
+    by_shape = np.select([count <= 8, count <= 16], GRID_SIZES[:2], GRID_SIZES[2])
+    return np.where(thorough, GRID_SIZES[2], by_shape)
+
+
 def _candidates(
     parcels: ParcelRings,
     boundary: Boundary,
@@ -120,7 +135,7 @@ def _candidates(
     *,
     thorough: bool,
 ) -> Cuts:
-    """Streamlines, and straight halvings where the parcel is small."""
+    """Streamlines, straight halvings where the parcel is small, and chords if thorough."""
     rings, field_t = _field_rings(parcels, boundary, rows, field_vertices)
     field = sample_field(rings, size)
     wanted = params.candidates // 2 * (3 if thorough else 1)
@@ -134,6 +149,8 @@ def _candidates(
         aligned=aligned,
     )
     sets = [streamline_cuts(boundary, rings, field, field_t, seeds)]
+    if thorough:
+        sets.append(chord_cuts(boundary, np.arange(len(rows))))
     small = np.flatnonzero(halved > 0)
     if len(small):
         sets.append(halving_cuts(boundary, field, small, halved[small]))

@@ -1,0 +1,133 @@
+"""What a finished layout does not keep of what was wanted, parcel by parcel."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.planar import FloatArray
+from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.site import Issue
+from urban_processing.subdivision.cuts import AREA_ROUNDING
+
+COUNT_TOLERANCE = 0.03
+"""The number of parcels is reached within this share."""
+
+VERY_LARGE = 3.0
+"""Parcels above so many smallest areas are listed."""
+
+LEAST_FRONTAGE, LEAST_FRONTAGE_SHARE = 3.0, 0.25
+"""A parcel is reached from this frontage on: metres, or this share of √area where that is less."""
+
+
+def findings(layout: Layout, params: CogenerateParams) -> list[Issue]:
+    """List a missed number of parcels, parcels of a wrong size or without street, dead ends."""
+    return [
+        *_count(layout, params),
+        *_sizes(layout),
+        *_unreached(layout),
+        *(_ends(layout) if params.pattern is StreetPattern.LOOP else []),
+    ]
+
+
+def _count(layout: Layout, params: CogenerateParams) -> list[Issue]:
+    wanted, found = params.parcels, layout.mesh.n_faces
+    if wanted is None or abs(found - wanted) <= COUNT_TOLERANCE * wanted:
+        return []
+    reason = (
+        f"the land has {len(np.unique(layout.face_part))} parts, and each is at least one parcel."
+        if found > wanted
+        else "some parcels could not be cut any further."
+    )
+    return [
+        Issue(
+            code="count_missed",
+            message=f"{found} parcels instead of {wanted}: {reason}",
+            value=float(found),
+            limit=float(wanted),
+        )
+    ]
+
+
+def _of_parcels(
+    layout: Layout,
+    code: str,
+    message: str,
+    chosen: np.ndarray,
+    value: FloatArray,
+    limit: FloatArray,
+) -> list[Issue]:
+    """One issue for each chosen parcel; `{value}` and `{limit}` are filled in."""
+    faces = np.flatnonzero(chosen).tolist()
+    if not faces:
+        return []
+    polygons = layout.mesh.face_polygons()
+    return [
+        Issue(
+            code=code,
+            message=message.format(value=float(value[f]), limit=float(limit[f])),
+            part=int(layout.face_part[f]),
+            parcel_id=f + 1,
+            value=float(value[f]),
+            limit=float(limit[f]),
+            geometry=polygons[f],
+        )
+        for f in faces
+    ]
+
+
+def _sizes(layout: Layout) -> list[Issue]:
+    """Parts too small for a parcel, and parcels that stayed very large."""
+    area = layout.mesh.face_area
+    least = np.full(len(area), layout.min_area)
+    most = VERY_LARGE * least
+    return _of_parcels(
+        layout,
+        "part_below_min_area",
+        "This part of the land ({value:.0f} m²) is smaller than the smallest parcel allowed "
+        "({limit:.0f} m²) and stays one parcel.",
+        area < least * (1.0 - AREA_ROUNDING),
+        area,
+        least,
+    ) + _of_parcels(
+        layout,
+        "parcel_not_cut",
+        "No cut of this parcel ({value:.0f} m²) leaves two simple halves that are large enough; "
+        "it is larger than {limit:.0f} m².",
+        area > most,
+        area,
+        most,
+    )
+
+
+def _unreached(layout: Layout) -> list[Issue]:
+    """Parcels with too little frontage, which happens where the rim is no street."""
+    needed = np.minimum(LEAST_FRONTAGE, LEAST_FRONTAGE_SHARE * np.sqrt(layout.mesh.face_area))
+    return _of_parcels(
+        layout,
+        "parcel_not_reached",
+        "No street can reach this parcel without running along a rim that is no street: its "
+        "frontage is {value:.1f} m, {limit:.1f} m are needed.",
+        (layout.frontage < needed) & ~layout.face_locked,
+        layout.frontage,
+        needed,
+    )
+
+
+def _ends(layout: Layout) -> list[Issue]:
+    """Dead ends of the loop pattern, which happen where the rim is no street, or at holes."""
+    mesh = layout.mesh
+    at = mesh.origin[np.repeat(layout.edge_street, 2)]
+    ends = np.flatnonzero(np.bincount(at, minlength=mesh.n_vertices) == 1)
+    at_hole = np.zeros(mesh.n_vertices, dtype=bool)
+    at_hole[mesh.origin[np.repeat(layout.edge_kind == EdgeKind.HOLE, 2)]] = True
+    return [
+        Issue(
+            code="dead_end",
+            message="This street end could not be led on"
+            + (" past the hole." if at_hole[v] else " without a street on the rim."),
+            geometry=shapely.Point(mesh.xy[v]),
+        )
+        for v in ends.tolist()
+    ]
