@@ -17,7 +17,8 @@ from urban_processing.pipelines.cogenerate import cogenerate
 SMOOTH = ("rect", "triangle", "ellipse", "irregular_64ha", "wyoming", "sant_adria")
 NOTCHED = ("wandsworth", "islington", "schaan", "planken", "schellenberg", "mauren")
 IN_PARTS = ("schaan", "planken")
-"""Five parts each, every one with streets of its own: fewer parcels share a street."""
+"""Five parts each, small and notched, and two holes: more parcels lie at a rim, and fewer share
+a street, since every part has streets of its own."""
 
 Find = Callable[[str], Path]
 
@@ -51,13 +52,13 @@ def test_certificate_holds(sample: Find, name: str, parcels: int, pattern: str) 
 def test_quality_of_500_parcels(sample: Find, name: str) -> None:
     found = figures(laid_out(sample(name), 500, "loop"))
     smooth = name in SMOOTH
-    assert found["quads_pct"] >= (99 if smooth else 96)
+    assert found["quads_pct"] >= (99 if smooth else 96.5)
     assert found["irregularity_mean"] <= (0.025 if smooth else 0.040)
-    assert found["irregular_pct"] <= (1 if smooth else 4)
-    assert found["junction_deviation_deg"] <= 5.5
-    assert found["street_length_relative"] <= 0.68
+    assert found["irregular_pct"] <= (1 if smooth else 6.5 if name in IN_PARTS else 3.5)
+    assert found["junction_deviation_deg"] <= 5
+    assert found["street_length_relative"] <= 0.65
     assert found["block_parcels_max"] <= 50
-    assert found["parcels_per_street"] >= (7 if name in IN_PARTS else 9.5)
+    assert found["parcels_per_street"] >= (7 if name in IN_PARTS else 10)
 
 
 @pytest.mark.parametrize("name", ["triangle", "islington", "schellenberg"])
@@ -66,6 +67,6 @@ def test_recommended_rules_are_better_than_those_printed(sample: Find, name: str
     printed = laid_out(sample(name), 500, "loop", "chen2024")
     assert certificate(printed).holds
     theirs = figures(printed)
-    assert ours["irregularity_mean"] < 0.7 * theirs["irregularity_mean"]
+    assert ours["irregularity_mean"] < 0.75 * theirs["irregularity_mean"]
     assert ours["irregular_pct"] <= theirs["irregular_pct"]
     assert ours["parcels_per_street"] > theirs["parcels_per_street"]

@@ -14,12 +14,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from shapely import affinity
 
+from urban_processing.access_rule import is_reached
 from urban_processing.layout import EdgeKind, Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.params import CogenerateParams, Preset
 from urban_processing.site import Frame
-from urban_processing.streets.access_rule import is_reached
 from urban_processing.streets.blocks import LARGEST_BLOCK
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets

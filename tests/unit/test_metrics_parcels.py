@@ -7,8 +7,9 @@ import pytest
 import shapely
 from grid_layouts import boxes, grid, layout_of
 
+from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
-from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels, reached_frontage
+from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
 
 
 def alone(*points: tuple[float, float], rim: bool = True) -> ParcelMeasures:

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import shapely
 
-from urban_processing.layout import EdgeKind, Layout, layout_from_mesh
-from urban_processing.mesh.build import mesh_from_polygons
-from urban_processing.params import CogenerateParams, Preset
-from urban_processing.site import Frame
-from urban_processing.streets.access import find_accesses
-from urban_processing.streets.access_rule import (
+from urban_processing.access_rule import (
     ACCESS_SHARE,
     is_reached,
     reached_frontage,
     required_frontage,
     unreached_parcels_of,
 )
+from urban_processing.layout import EdgeKind, Layout, layout_from_mesh
+from urban_processing.mesh.build import mesh_from_polygons
+from urban_processing.params import CogenerateParams, Preset
+from urban_processing.site import Frame
+from urban_processing.streets.access import find_accesses
 from urban_processing.streets.blocks import (
     LARGEST_BLOCK,
     flood_block,

@@ -11,10 +11,10 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.metrics.overlap import covered_share, find_overlaps, segments_of
-from urban_processing.metrics.parcels import reached_frontage
 from urban_processing.metrics.tables import (
     Table,
     boundary_table,

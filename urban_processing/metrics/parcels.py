@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
 from urban_processing.mesh.corners import (
     interior_angles,
@@ -16,10 +17,6 @@ from urban_processing.mesh.corners import (
     ring_neighbours,
 )
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-
-REACHED_M = 3.0
-REACHED_SHARE = 0.25
-"""A parcel is reached from this frontage on: `REACHED_M`, or this share of √area if less."""
 
 OPPOSITE_DEG = 135.0
 """Sides are opposite where their outward normals make a larger angle."""
@@ -93,12 +90,6 @@ class ParcelMeasures:
             (self.angle_deviation > UNDESIRABLE_ANGLE_DEG)
             | (self.area_ratio > UNDESIRABLE_AREA_RATIO)
         )
-
-
-def reached_frontage(area: npt.ArrayLike) -> FloatArray:
-    """Frontage in metres from which parcels of `area` m² are reached: min(3 m, 0.25·√area)."""
-    side = np.sqrt(np.asarray(area, dtype=np.float64))
-    return np.asarray(np.minimum(REACHED_M, REACHED_SHARE * side))
 
 
 def measure_parcels(layout: Layout) -> ParcelMeasures:

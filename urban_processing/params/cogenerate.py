@@ -267,7 +267,7 @@ class Rules:
 
 RULES: dict[Preset, Rules] = {
     Preset.RECOMMENDED: Rules(
-        weights=(0.3, 0.9, 0.15),
+        weights=(0.3, 0.9, 0.1),
         size_cap=0.7,
         continuity=0.05,
         clearance=0.4,

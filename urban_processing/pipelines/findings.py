@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from urban_processing.access_rule import reached_frontage, unreached_parcels_of
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
@@ -16,9 +17,6 @@ COUNT_TOLERANCE = 0.03
 
 VERY_LARGE = 3.0
 """Parcels above so many smallest areas are listed."""
-
-LEAST_FRONTAGE, LEAST_FRONTAGE_SHARE = 3.0, 0.25
-"""A parcel is reached from this frontage on: metres, or this share of √area where that is less."""
 
 
 def findings(layout: Layout, params: CogenerateParams) -> list[Issue]:
@@ -103,13 +101,15 @@ def _sizes(layout: Layout) -> list[Issue]:
 
 def _unreached(layout: Layout) -> list[Issue]:
     """Parcels with too little frontage, which happens where the rim is no street."""
-    needed = np.minimum(LEAST_FRONTAGE, LEAST_FRONTAGE_SHARE * np.sqrt(layout.mesh.face_area))
+    needed = reached_frontage(layout.mesh.face_area)
+    unreached = np.zeros(len(needed), dtype=bool)
+    unreached[unreached_parcels_of(layout)] = True
     return _of_parcels(
         layout,
         "parcel_not_reached",
         "No street can reach this parcel without running along a rim that is no street: its "
         "frontage is {value:.1f} m, {limit:.1f} m are needed.",
-        (layout.frontage < needed) & ~layout.face_locked,
+        unreached,
         layout.frontage,
         needed,
     )

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from urban_processing.access_rule import required_frontage
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.corner_graph import CornerGraph
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.params import CogenerateParams
-from urban_processing.streets.access_rule import required_frontage
 
 STRAIGHT = math.radians(45.0)
 """Two chains are collinear while the turn between them is less, that is, while their included

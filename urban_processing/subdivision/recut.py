@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from urban_processing.access_rule import is_reached
 from urban_processing.layout import Layout
 from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.streets.access_rule import is_reached
 from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.streamline import propose_cuts
