@@ -36,7 +36,7 @@ FLOOR_SHARE = 0.6
 MOST_PARCELS = 2_000_000
 """More parcels than this are refused: the run would take hours and all the memory."""
 
-SECONDS_PER_PARCEL = 1.2e-3
+SECONDS_PER_PARCEL = 1.8e-3
 """For the estimate that is given before a long run; one core of a common machine."""
 
 
