@@ -82,7 +82,7 @@ def reported_polygons(xy: FloatArray, offsets: IntArray) -> tuple[IntArray, IntA
         Ragged indices into `xy`, in ring order.
     """
     kept = simplified_vertices(xy, offsets, SIMPLIFY_SHARE)
-    return thin_corners(xy, kept, _count_offsets(kept, offsets))
+    return thin_corners(xy, kept, np.searchsorted(kept, offsets))
 
 
 def thin_corners(
@@ -175,11 +175,6 @@ def sharpest_vertex(xy: FloatArray, offsets: IntArray) -> IntArray:
     turn = np.asarray(np.round(turn, 9), dtype=np.float64)
     top = np.maximum.reduceat(turn, offsets[:-1])
     return np.flatnonzero(_first_equal(turn, np.repeat(top, np.diff(offsets)), offsets))
-
-
-def _count_offsets(indices: IntArray, offsets: IntArray) -> IntArray:
-    """Offsets of sorted vertex indices by the rings they belong to."""
-    return np.searchsorted(indices, offsets)
 
 
 def _ragged_mean(values: FloatArray, offsets: IntArray) -> FloatArray:

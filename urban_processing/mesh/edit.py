@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray, PlanarMesh
+from urban_processing.mesh.planar import OUTSIDE, IntArray, PlanarMesh
 from urban_processing.site import GRID
 
 
@@ -221,11 +221,6 @@ class MeshEditor:
         """Put a vertex elsewhere."""
         self.x[vertex] = round(x / GRID) * GRID
         self.y[vertex] = round(y / GRID) * GRID
-
-    def coordinates(self, half_edges: list[int]) -> FloatArray:
-        """(n, 2) positions of the origins of half-edges."""
-        origin, x, y = self.origin, self.x, self.y
-        return np.array([(x[origin[h]], y[origin[h]]) for h in half_edges])
 
     def commit(self) -> tuple[PlanarMesh, Remap]:
         """Return the edited mesh and where its elements come from."""

@@ -171,13 +171,8 @@ class PlanarMesh:
     def face_polygons(self, offset: tuple[float, float] = (0.0, 0.0)) -> npt.NDArray[np.object_]:
         """(F,) shapely polygons of the faces, shifted by `offset`."""
         loops = self.loops
-        h = loops.half_edges
-        counts = np.diff(loops.offsets)
-        closed = np.insert(h, loops.offsets[1:], h[loops.offsets[:-1]])
-        rings = shapely.linearrings(
-            self.xy[self.origin[closed]] + np.asarray(offset),
-            indices=np.repeat(np.arange(len(counts)), counts + 1),
-        )
+        xy = self.xy[self.origin[loops.half_edges]] + np.asarray(offset)
+        rings = linear_rings(xy, loops.offsets)
         polygons = shapely.polygons(rings[self.face_loop])
         for face in np.flatnonzero(self.face_n_loops > 1):
             own = np.flatnonzero(loops.face == face)
@@ -254,6 +249,13 @@ class Loops:
     def ring(self, loop: int) -> IntArray:
         """Half-edges of one loop in order."""
         return self.half_edges[self.offsets[loop] : self.offsets[loop + 1]]
+
+
+def linear_rings(xy: FloatArray, offsets: IntArray) -> npt.NDArray[np.object_]:
+    """Shapely rings of ragged, unclosed rings: ring i is ``xy[offsets[i]:offsets[i + 1]]``."""
+    closed = np.insert(xy, offsets[1:], xy[offsets[:-1]], axis=0)
+    ring = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets) + 1)
+    return np.asarray(shapely.linearrings(closed, indices=ring), dtype=object)
 
 
 def rank_cycles(successor: IntArray) -> tuple[IntArray, IntArray]:

@@ -11,7 +11,7 @@ import shapely
 
 from urban_processing.layout import Layout
 from urban_processing.mesh.edit import MeshEditor
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, linear_rings
 from urban_processing.site import GRID, snap_to_grid
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.parcels import ParcelRings
@@ -85,7 +85,7 @@ class _Inserter:
         self.target = layout.mesh.target
 
     def draft(self, row: int, cut: Cut, snap: float) -> _Draft | None:
-        """Resolve both ends; None where they fall together or on one straight edge."""
+        """Resolve both ends; None where they fall together."""
         start = self._end(row, cut.edge_a, cut.along_a, snap)
         stop = self._end(row, cut.edge_b, cut.along_b, snap)
         if start == stop:
@@ -222,9 +222,8 @@ class _Inserter:
 
 
 def _legal_rings(points: list[FloatArray], min_area: float) -> BoolArray:
-    counts = np.array([len(p) for p in points])
-    closed = np.concatenate([np.concatenate([p, p[:1]]) for p in points])
-    rings = shapely.linearrings(closed, indices=np.repeat(np.arange(len(points)), counts + 1))
+    offsets = np.append(0, np.cumsum([len(p) for p in points]))
+    rings = linear_rings(np.concatenate(points), offsets)
     polygons = shapely.polygons(rings)
     signed = shapely.is_ccw(rings)
     return np.asarray(

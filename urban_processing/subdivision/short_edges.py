@@ -17,7 +17,7 @@ from urban_processing.mesh.corners import (
     ring_areas,
 )
 from urban_processing.mesh.edit import MeshEditor
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, linear_rings
 
 SHORT_SHARE = 0.2
 """An edge is short below this share of the mean side of either parcel (Chen 2024, 4.1)."""
@@ -278,9 +278,7 @@ def _shapes(rings: list[list[tuple[float, float]]]) -> _Shapes:
     offsets = np.append(0, np.cumsum(count))
     xy = np.array([p for i in proper for p in rings[i]])
     area[proper] = ring_areas(xy, offsets)
-    closed = np.insert(xy, offsets[1:], xy[offsets[:-1]], axis=0)
-    of_ring = np.repeat(np.arange(len(proper)), count + 1)
-    polygons = shapely.polygons(shapely.linearrings(closed, indices=of_ring))
+    polygons = shapely.polygons(linear_rings(xy, offsets))
     simple[proper] = shapely.is_valid(polygons) & (area[proper] > 0)
     corners, corner_offsets = reported_polygons(xy, offsets)
     irregularity[proper] = polygon_irregularity(xy[corners], corner_offsets)
