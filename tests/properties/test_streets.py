@@ -65,7 +65,7 @@ def bisect(layout: Layout, rng: np.random.Generator) -> Layout:
 
 
 def _cut(editor: MeshEditor, ring: list[int], middle: complex, normal: complex) -> None:
-    z = editor.coordinates(ring) @ np.array([1.0, 1.0j])
+    z = np.array([complex(editor.x[v], editor.y[v]) for v in (editor.origin[h] for h in ring)])
     s = ((z - middle) * normal.conjugate()).real
     hits = []
     for k, h in enumerate(ring):
