@@ -55,6 +55,11 @@ class Column:
     alias: str
     nullable: bool = False
 
+    @property
+    def label(self) -> str:
+        """The readable name with the unit: ``Area [m²]``."""
+        return f"{self.alias} [{self.unit}]" if self.unit else self.alias
+
 
 @dataclass(frozen=True)
 class Layer:

@@ -12,8 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urban_processing.errors import BoundaryError
-from urban_processing.io import crs as rules
+from urban_processing.intake.crs_choice import (
+    AREA_SCALE_TOLERANCE,
+    area_scale_error,
+    choose_crs,
+)
 from urban_processing.io.boundaries import read_boundary
+from urban_processing.io.crs import PYPROJ, WGS84
 from urban_processing.io.files import read_layout, write_layout
 from urban_processing.layout import Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
@@ -78,9 +83,9 @@ def test_chosen_crs_is_true_to_area(lon: float, lat: float, size: float) -> None
     low, high = max(lat - size / 2, -89.0), min(lat + size / 2, 89.0)
     xy = np.array([[lon, low], [lon + size, low], [lon + size, high], [lon, high]])
     xy[:, 0] = (xy[:, 0] + 180) % 360 - 180
-    chosen = rules.choose_crs(rules.WGS84, xy)
-    assert rules.is_metric(chosen.crs)
-    assert rules.area_scale_error(chosen.crs, xy) <= rules.AREA_SCALE_TOLERANCE
+    chosen = choose_crs(WGS84, xy, PYPROJ)
+    assert PYPROJ.facts(chosen.crs).metric
+    assert area_scale_error(chosen.crs, xy, PYPROJ) <= AREA_SCALE_TOLERANCE
 
 
 def any_layout(seed: int) -> Layout:

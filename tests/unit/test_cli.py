@@ -462,7 +462,7 @@ def test_stopping_leaves_no_half_written_file(
     if when == "run":
         monkeypatch.setattr("urban_processing.pipelines.cogenerate.step", stop)
     else:  # when the file beside the target is there, but not whole
-        written = "urban_processing.io.files.write_geopackage"
+        written = "urban_processing.layout_file.files.write_geopackage"
         monkeypatch.setattr(written, lambda path, *_a, **_k: (path.touch(), stop()))
     out = tmp_path / "out.gpkg"
     out.write_bytes(b"before")

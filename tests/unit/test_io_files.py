@@ -18,11 +18,12 @@ import shapely
 from grid_layouts import boxes, layout_of
 
 from urban_processing.errors import BoundaryError, OutputError, ParameterError, TopologyError
-from urban_processing.io import files
 from urban_processing.io.exports import check_export, export_layout
-from urban_processing.io.files import check_output, read_layout, timeless, write_layout
+from urban_processing.io.files import read_layout, write_layout
 from urban_processing.io.frames import GeoLayout
 from urban_processing.layout import Layout, Step
+from urban_processing.layout_file import files
+from urban_processing.layout_file.files import check_output, timeless
 from urban_processing.metrics.tables import Table, layout_tables
 from urban_processing.rebuild import canonical
 from urban_processing.schema import LAYERS, GeometryType

@@ -14,7 +14,7 @@ def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
     """Return one sentence for each reason why an output cannot be written where it is to go."""
     path, overwrite = Path(given[output.name]), given["overwrite"]
     if output.kind is OutputKind.LAYOUT:
-        from urban_processing.io.files import check_output
+        from urban_processing.layout_file.files import check_output
 
         return check_output(path, overwrite=overwrite)
     if output.kind is OutputKind.MAP:

@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 import pyproj
 import shapely
 
 from urban_processing.errors import BoundaryError
-from urban_processing.io import crs as crs_rules
-from urban_processing.io.features import Features, Source, read_features
-from urban_processing.io.polygons import Cleaned, clean_polygons
-from urban_processing.site import GRID, FloatArray, Frame, Issue, Site, snap_to_grid
-
-MINIMUM_AREA = 1.0
-"""Land below this many m² is a mistake, most often degrees taken for metres."""
-
-SLIVER = 1e-4
-"""Holes that a circle of this radius, relative to √area of the land, does not fit into are
-gaps between badly matched polygons, not obstacles."""
-
-SPECK = 1e-9
-"""Parts below this share of the land are left over from repair, not land."""
-
-MAX_STEP_DEGREES = 0.25
-"""Longest edge of a geographic boundary that is projected as a straight line."""
-
-CORNER_REACH = 0.1
-"""Given corners may lie this far off the land's rim, relative to √area."""
+from urban_processing.intake.features import Features
+from urban_processing.intake.sites import build_site
+from urban_processing.io.crs import PYPROJ, parse_crs
+from urban_processing.io.features import Source, read_features
+from urban_processing.site import Site
 
 
 def read_boundary(
@@ -85,57 +67,14 @@ def read_boundary(
     asked = _asked_crs(crs, problems)
     features = _read(source, layer, where, problems)
     given_corners = _read_corners(corners, problems)
-    if features is None:
-        raise BoundaryError(problems)
-    issues: list[Issue] = []
-    own = _source_crs(features, asked, problems, issues)
-    cleaned = _cleaned(features, problems)
-    if problems or cleaned is None:
-        raise BoundaryError(problems)
-    working = _working_crs(cleaned, own, asked, issues)
-    projection = _Projection(own, working)
-    land, origin = _to_local(cleaned.land, projection)
-    parts = _sorted_parts(_without_slivers(land, issues))
-    frame = Frame(crs_rules.crs_text(working), origin)
-    site = Site(
-        parts=parts,
-        frame=frame,
-        corners=_local_corners(given_corners, projection, origin, parts),
-        input_parts=_input_parts(cleaned.input_parts, projection, origin),
-        issues=(*issues, *_repair_issues(cleaned, projection, origin)),
-        input_sha256=_digest(cleaned.input_parts, own),
+    return build_site(
+        features, library=PYPROJ, asked=asked, corners=given_corners, problems=problems
     )
-    _check_size(site)
-    return site
-
-
-@dataclass(frozen=True)
-class _Projection:
-    """From the source's coordinates to the working CRS; identity where either is missing."""
-
-    source: pyproj.CRS | None
-    target: pyproj.CRS | None
-
-    @property
-    def is_identity(self) -> bool:
-        return self.source is None or self.target is None or self.source == self.target
-
-    def points(self, xy: FloatArray) -> FloatArray:
-        if self.source is None or self.target is None or self.is_identity:
-            return xy
-        return crs_rules.transform(xy, self.source, self.target)
-
-    def geometry(self, geometry: shapely.Geometry) -> shapely.Geometry:
-        if self.is_identity:
-            return geometry
-        if self.source is not None and self.source.is_geographic:
-            geometry = shapely.segmentize(geometry, MAX_STEP_DEGREES)
-        return shapely.transform(geometry, self.points)
 
 
 def _read(
     source: Source, layer: str | None, where: str | None, problems: list[str]
-) -> Features | None:
+) -> Features[pyproj.CRS] | None:
     try:
         return read_features(source, layer=layer, where=where)
     except BoundaryError as error:
@@ -147,175 +86,22 @@ def _asked_crs(crs: object, problems: list[str]) -> pyproj.CRS | None:
     if crs is None:
         return None
     try:
-        return crs_rules.parse_crs(crs)
+        return parse_crs(crs)
     except BoundaryError as error:
         problems += error.problems
         return None
 
 
-def _source_crs(
-    features: Features, asked: pyproj.CRS | None, problems: list[str], issues: list[Issue]
-) -> pyproj.CRS | None:
-    """CRS of the source's coordinates: its own, else the one asked for."""
-    if features.crs is not None:
-        if asked is not None and not crs_rules.is_metric(asked):
-            problems.append(
-                f"crs must be projected and in metres; {crs_rules.crs_label(asked)} is not. "
-                "Choose for example the UTM zone, or leave crs out."
-            )
-        return features.crs
-    if asked is not None:
-        if not features.bare:
-            message = f"{features.name} has no CRS; {crs_rules.crs_label(asked)} was taken for it."
-            issues.append(Issue("crs_assumed", message))
-        return asked
-    if not features.bare and not problems:
-        problems.append(
-            f"{features.name} has no CRS. Give it with crs (--crs EPSG:code), or assign it in "
-            "the data: GeoDataFrame.set_crs, or Assign Projection in QGIS."
-        )
-    return None
-
-
-def _cleaned(features: Features, problems: list[str]) -> Cleaned | None:
-    try:
-        return clean_polygons(features)
-    except BoundaryError as error:
-        problems += error.problems
-        return None
-
-
-def _working_crs(
-    cleaned: Cleaned, own: pyproj.CRS | None, asked: pyproj.CRS | None, issues: list[Issue]
-) -> pyproj.CRS | None:
-    if own is None:
-        return None
-    if asked is not None and crs_rules.is_metric(asked):
-        return asked
-    chosen = crs_rules.choose_crs(own, shapely.get_coordinates(cleaned.land))
-    if chosen.reason:
-        issues.append(
-            Issue(
-                "crs_changed",
-                f"The boundary is in {crs_rules.crs_label(own)}, but {chosen.reason}: the layout "
-                f"is in {crs_rules.crs_label(chosen.crs)}.",
-            )
-        )
-    return chosen.crs
-
-
-def _to_local(
-    land: shapely.Geometry, projection: _Projection
-) -> tuple[shapely.Geometry, tuple[float, float]]:
-    """Project the land, shift it to a whole-metre origin and put it on the grid."""
-    mapped = projection.geometry(land)
-    if not np.isfinite(shapely.get_coordinates(mapped)).all():
-        raise BoundaryError(
-            "Some coordinates of the boundary have no place in the CRS asked for: choose one "
-            "that covers the land, or leave crs (--crs) out."
-        )
-    min_x, min_y = shapely.bounds(mapped)[:2]
-    origin = float(np.floor(min_x)), float(np.floor(min_y))
-    local = shapely.transform(mapped, lambda xy: xy - origin)
-    # projecting can make edges cross by a hair, and bring together what lay on both sides
-    # of the 180th meridian
-    united = shapely.union_all(shapely.get_parts(shapely.make_valid(local)))
-    return shapely.set_precision(united, GRID), origin
-
-
-def _without_slivers(land: shapely.Geometry, issues: list[Issue]) -> list[shapely.Polygon]:
-    """Drop specks and fill sliver holes, and say so."""
-    polygons = [p for p in shapely.get_parts(land) if p.geom_type == "Polygon" and p.area > 0]
-    total = sum(p.area for p in polygons)
-    specks = [p for p in polygons if p.area < SPECK * total]
-    if specks:
-        message = f"{len(specks)} speck(s) left over from repair were dropped."
-        issues.append(Issue("specks_dropped", message, value=sum(p.area for p in specks)))
-    radius = SLIVER * total**0.5
-    kept, filled = [], []
-    for polygon in (p for p in polygons if p.area >= SPECK * total):
-        holes = [shapely.Polygon(ring) for ring in polygon.interiors]
-        slivers = [h for h in holes if shapely.buffer(h, -radius).is_empty]
-        filled += slivers
-        kept.append(shapely.union_all([polygon, *slivers]) if slivers else polygon)
-    if filled:
-        area = sum(h.area for h in filled)
-        issues.append(
-            Issue(
-                "gaps_filled",
-                f"{len(filled)} gap(s) between polygons, narrower than {2 * radius:.2g} m, were "
-                f"filled ({area:.3g} m²).",
-                value=area,
-                geometry=shapely.MultiPolygon(filled) if len(filled) > 1 else filled[0],
-            )
-        )
-    return kept
-
-
-def _sorted_parts(polygons: list[shapely.Polygon]) -> tuple[shapely.Polygon, ...]:
-    """Largest first, ties by coordinates; canonical start of every ring."""
-    canonical = [
-        shapely.transform(p, snap_to_grid)
-        for p in shapely.orient_polygons(shapely.normalize(np.array(polygons, dtype=object)))
-    ]
-    return tuple(sorted(canonical, key=lambda p: (-p.area, p.bounds, p.wkb)))
-
-
-def _input_parts(
-    polygons: npt.NDArray[np.object_], projection: _Projection, origin: tuple[float, float]
-) -> tuple[shapely.Polygon, ...]:
-    if projection.is_identity:
-        return tuple(shapely.transform(p, lambda xy: xy - origin) for p in polygons)
-    return tuple(
-        shapely.transform(projection.geometry(p), lambda xy: snap_to_grid(xy - origin))
-        for p in polygons
-    )
-
-
-def _repair_issues(
-    cleaned: Cleaned, projection: _Projection, origin: tuple[float, float]
-) -> list[Issue]:
-    return [
-        Issue(
-            code=note.code,
-            message=note.message,
-            value=note.value,
-            geometry=None
-            if note.place is None
-            else shapely.transform(note.place, lambda xy: projection.points(xy) - origin),
-        )
-        for note in cleaned.notes
-    ]
-
-
-def _check_size(site: Site) -> None:
-    if site.area < MINIMUM_AREA:
-        raise BoundaryError(
-            f"The land has an area of only {site.area:.3g} m². If its coordinates are degrees, "
-            "give their CRS: crs='EPSG:4326' (--crs EPSG:4326)."
-        )
-
-
-def _digest(polygons: npt.NDArray[np.object_], crs: pyproj.CRS | None) -> str:
-    """Hash of the polygons as given, whatever their order, and of their CRS."""
-    wkb = sorted(shapely.to_wkb(shapely.normalize(polygons), byte_order=1))
-    return hashlib.sha256(b"".join([*wkb, crs_rules.crs_text(crs).encode()])).hexdigest()
-
-
-def _read_corners(corners: Source | npt.ArrayLike | None, problems: list[str]) -> Features | None:
+def _read_corners(
+    corners: Source | npt.ArrayLike | None, problems: list[str]
+) -> Features[pyproj.CRS] | None:
     if corners is None:
         return None
     try:
-        features = read_features(_as_points(corners))
+        return read_features(_as_points(corners))
     except BoundaryError as error:
         problems += [f"Corners: {problem}" for problem in error.problems]
         return None
-    usable = [g for g in features.geometry if g is not None and not g.is_empty]
-    if not usable or {g.geom_type for g in usable} - {"Point", "MultiPoint"}:
-        problems.append("Corners must be points; give a point layer or an array (k, 2).")
-    elif not np.isfinite(shapely.get_coordinates(usable)).all():
-        problems.append("Corners: a coordinate is not finite.")
-    return features
 
 
 def _as_points(corners: Source | npt.ArrayLike) -> Source:
@@ -330,28 +116,3 @@ def _as_points(corners: Source | npt.ArrayLike) -> Source:
             raise BoundaryError(f"they must be an array (k, 2); got shape {xy.shape}.")
         return shapely.points(xy)
     return corners
-
-
-def _local_corners(
-    features: Features | None,
-    projection: _Projection,
-    origin: tuple[float, float],
-    parts: tuple[shapely.Polygon, ...],
-) -> FloatArray:
-    """Corners in local coordinates, checked to lie near the rim."""
-    if features is None:
-        return np.empty((0, 2))
-    xy = shapely.get_coordinates([g for g in features.geometry if g is not None])
-    own = _Projection(features.crs or projection.source, projection.target)
-    local = snap_to_grid(own.points(xy) - origin)
-    rim = shapely.union_all([p.exterior for p in parts])
-    distance = shapely.distance(shapely.points(local), rim)
-    reach = CORNER_REACH * sum(p.area for p in parts) ** 0.5
-    far = np.flatnonzero(~(distance <= reach))
-    if len(far):
-        raise BoundaryError(
-            f"Corner {i + 1} lies {distance[i]:.3g} m from the rim of the land; corners must lie "
-            f"on it, or within {reach:.3g} m. Check their CRS."
-            for i in far
-        )
-    return local

@@ -12,12 +12,11 @@ import shapely
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from urban_processing.errors import DependencyError, OutputError, ParameterError
-from urban_processing.io.files import folder_problems, timeless
 from urban_processing.io.frames import table_frame
-from urban_processing.io.geopackage import field_arrays
 from urban_processing.layout import Layout
+from urban_processing.layout_file.files import as_written, folder_problems
+from urban_processing.layout_file.geopackage import field_arrays
 from urban_processing.metrics.tables import Table, layout_tables
-from urban_processing.rebuild import canonical
 from urban_processing.schema import LAYERS, GeometryType, Layer
 
 COORDINATE_DIGITS = "9"
@@ -70,7 +69,7 @@ def export_layout(
         problems.append("GeoJSON is in WGS 84, but the layout has no CRS: give its boundary one.")
     if problems:
         raise OutputError(problems)
-    tables = layout_tables(canonical(timeless(layout)))
+    tables = layout_tables(as_written(layout))
     layers = [layer for layer in LAYERS if layer.name in tables]
     write = _write_geojson if chosen is ExportKind.GEOJSON else _write_parquet
     try:

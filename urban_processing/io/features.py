@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -15,6 +14,7 @@ import shapely
 from pyogrio.errors import DataLayerError, DataSourceError, FieldError, GeometryError
 
 from urban_processing.errors import BoundaryError, DependencyError
+from urban_processing.intake.features import Features
 from urban_processing.io.crs import horizontal
 
 if TYPE_CHECKING:
@@ -27,31 +27,9 @@ PARQUET = (".parquet", ".geoparquet", ".pq")
 _PREFERRED_LAYER = "boundary"
 
 
-@dataclass(frozen=True)
-class Features:
-    """Geometries as given.
-
-    Parameters
-    ----------
-    geometry
-        (n,) shapely geometries or None.
-    crs
-        Horizontal CRS, None where the source has none.
-    name
-        What to call the source in messages.
-    bare
-        Whether the source cannot carry a CRS (shapely geometries).
-    """
-
-    geometry: npt.NDArray[np.object_]
-    crs: pyproj.CRS | None
-    name: str
-    bare: bool = False
-
-
 def read_features(
     source: Source, *, layer: str | None = None, where: str | None = None
-) -> Features:
+) -> Features[pyproj.CRS]:
     """Read the features of a file, or take those of a frame or of shapely geometries.
 
     Parameters
@@ -114,7 +92,7 @@ def _must_exist(path: str) -> None:
         raise BoundaryError(f"{path} is a folder: give the file in it.")
 
 
-def _read_parquet(path: str, layer: str | None, where: str | None) -> Features:
+def _read_parquet(path: str, layer: str | None, where: str | None) -> Features[pyproj.CRS]:
     import geopandas
 
     _must_exist(path)
@@ -132,7 +110,7 @@ def _read_parquet(path: str, layer: str | None, where: str | None) -> Features:
     return Features(np.asarray(frame.geometry, dtype=object), _usable(frame.crs), path)
 
 
-def _read_file(path: str, layer: str | None, where: str | None) -> Features:
+def _read_file(path: str, layer: str | None, where: str | None) -> Features[pyproj.CRS]:
     _must_exist(path)
     layer = _choose_layer(path, layer)
     try:

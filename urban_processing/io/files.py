@@ -1,40 +1,14 @@
-"""Layout files: the GeoPackage that holds everything, and plain exports."""
+"""Layout files in and out, by pyogrio."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import math
-import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-import pyogrio
-import shapely
-from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
-
-from urban_processing.errors import BoundaryError, OutputError, TopologyError
-from urban_processing.io.geopackage import read_state, write_geopackage
-from urban_processing.layout import Layout, Step
-from urban_processing.metrics.tables import layout_tables
-from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
-from urban_processing.schema import ISSUES, PARCELS, PROVENANCE, STREETS
-from urban_processing.site import FloatArray, Frame, Issue
-
-if TYPE_CHECKING:
-    from urban_processing.io.frames import GeoLayout
-
-FILE_FORMAT = 1
-"""Number of the way in which layout files keep what the schema does not say."""
-
-SUFFIX = ".gpkg"
-_SIDE_FILES = ("-journal", "-wal")
+from urban_processing.io.frames import GeoLayout
+from urban_processing.io.geopackage import PYOGRIO
+from urban_processing.layout import Layout
+from urban_processing.layout_file import files
 
 
 def write_layout(
@@ -69,60 +43,8 @@ def write_layout(
     OutputError
         If the file cannot be written there.
     """
-    target = Path(path)
-    problems = check_output(target, overwrite=overwrite)
-    if problems:
-        raise OutputError(problems)
-    layout = canonical(layout if record_seconds else timeless(layout))
-    with _replacing(target) as temporary:
-        write_geopackage(
-            temporary, layout_tables(layout), crs=layout.frame.crs, state=_state(layout)
-        )
-    return target
-
-
-def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[str]:
-    """Return one sentence for each reason why a layout file cannot be written.
-
-    Meant to be asked before a long run.
-    """
-    target = Path(path)
-    problems = []
-    if target.suffix.lower() != SUFFIX:
-        problems.append(f"The output {target} must be a GeoPackage: end its name in {SUFFIX}.")
-    problems += folder_problems(target.parent)
-    if target.is_dir():
-        problems.append(f"The output {target} is a folder: give the name of a file.")
-    elif target.exists() and not overwrite:
-        problems.append(
-            f"The output {target} exists already: choose another name, or allow overwriting "
-            "(--overwrite)."
-        )
-    beside = [target.with_name(target.name + end) for end in _SIDE_FILES]
-    if any(file.exists() for file in beside):
-        named = " and ".join(file.name for file in beside if file.exists())
-        problems.append(
-            f"The output {target} is open in another program ({named} lies beside it): close it "
-            "there, or choose another name."
-        )
-    return problems
-
-
-def timeless(layout: Layout) -> Layout:
-    """Return the layout without how long its steps took, which no two runs share."""
-    steps = [dataclasses.replace(step, seconds=math.nan) for step in layout.history]
-    return layout.replace(history=tuple(steps))
-
-
-def folder_problems(folder: Path) -> list[str]:
-    """Return why nothing can be written into a folder; nothing where it can."""
-    if not folder.exists():
-        return [f"The folder {folder} does not exist: create it first."]
-    if not folder.is_dir():
-        return [f"{folder} is not a folder."]
-    if not os.access(folder, os.W_OK | os.X_OK):
-        return [f"The folder {folder} is not writable: choose another, or change its rights."]
-    return []
+    written = files.as_written(layout, record_seconds=record_seconds)
+    return files.write_layout(written, path, library=PYOGRIO, overwrite=overwrite)
 
 
 def read_layout(path: str | PathLike[str]) -> GeoLayout:
@@ -135,163 +57,4 @@ def read_layout(path: str | PathLike[str]) -> GeoLayout:
     TopologyError
         If its parcels or streets were changed so that they no longer fit together.
     """
-    from urban_processing.io.frames import GeoLayout
-
-    source = Path(path)
-    state = _read_state(source)
-    frame = Frame(state["crs"], (float(state["origin"][0]), float(state["origin"][1])))
-    try:
-        parts = _read_parts(source, frame, np.asarray(state["corners"], dtype=np.float64))
-        issues = _read_issues(source, frame)
-        layout = rebuild_layout(parts, frame=frame, min_area=state["min_area"], issues=issues)
-    except TopologyError as error:
-        raise TopologyError(
-            [
-                f"The parcels and streets of {source} do not fit together any more; were they "
-                "edited?",
-                *error.problems,
-            ]
-        ) from error
-    except (DataSourceError, DataLayerError, KeyError, ValueError) as error:
-        raise BoundaryError(f"{source} is damaged or was changed: {error}") from error
-    return GeoLayout(
-        layout.replace(
-            corners_given=state["corners_given"],
-            history=_read_history(source),
-            input_parts=_read_input(source, frame),
-        )
-    )
-
-
-@contextmanager
-def _replacing(target: Path) -> Iterator[Path]:
-    """Give a temporary file beside `target` that takes its place if all goes well."""
-    try:
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
-            temporary = Path(folder) / target.name
-            yield temporary
-            temporary.replace(target)
-    except (DataSourceError, DataLayerError, FeatureError, FieldError, OSError) as error:
-        raise OutputError(f"{target} cannot be written: {error}") from error
-
-
-def _state(layout: Layout) -> str:
-    """Return what the layers do not say about a layout, as JSON."""
-    return json.dumps(
-        {
-            "format": FILE_FORMAT,
-            "crs": layout.frame.crs,
-            "origin": list(layout.frame.origin),
-            "min_area": layout.min_area,
-            "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
-            "corners_given": layout.corners_given,
-        }
-    )
-
-
-def _read_state(path: Path) -> dict[str, Any]:
-    if not path.exists():
-        raise BoundaryError(f"The file {path} does not exist.")
-    text = read_state(path)
-    if text is None:
-        raise BoundaryError(
-            f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."
-        )
-    state: dict[str, Any] = json.loads(text)
-    if state["format"] > FILE_FORMAT:
-        raise BoundaryError(
-            f"{path} was written by a newer version of this software: update to read it."
-        )
-    return state
-
-
-def _read_layer(
-    path: Path, layer: str, *columns: str
-) -> tuple[npt.NDArray[np.object_], dict[str, npt.NDArray[Any]]]:
-    """Geometries and columns of a layer in the order in which they were written."""
-    meta, _, wkb, values = pyogrio.raw.read(path, layer=layer, columns=list(columns))
-    found = dict(zip(meta["fields"].tolist(), values, strict=True))
-    geometry = np.empty(0, dtype=object) if wkb is None else shapely.from_wkb(wkb)
-    return np.asarray(geometry, dtype=object), {name: found[name] for name in columns}
-
-
-def _local(geometry: Any, frame: Frame) -> Any:
-    return shapely.transform(geometry, lambda xy: xy - np.asarray(frame.origin))
-
-
-def _read_parts(path: Path, frame: Frame, corners: FloatArray) -> LayoutParts:
-    polygons, parcel = _read_layer(
-        path, PARCELS.name, "parcel_id", "part", "level", "lineage", "locked"
-    )
-    order = np.argsort(parcel["parcel_id"], kind="stable")
-    lines, street = _read_layer(path, STREETS.name, "level")
-    segments, level = _segments(_local(lines, frame), street["level"])
-    lineage = [int(text, 16) for text in parcel["lineage"]]
-    return LayoutParts(
-        polygons=_local(polygons, frame)[order],
-        face_part=parcel["part"][order],
-        face_level=parcel["level"][order],
-        face_lineage=np.array(lineage, dtype=np.uint64)[order],
-        face_locked=parcel["locked"].astype(bool)[order],
-        segments=segments,
-        segment_level=level,
-        corners=corners.reshape(-1, 2),
-    )
-
-
-def _segments(
-    lines: npt.NDArray[np.object_], level: npt.NDArray[Any]
-) -> tuple[FloatArray, npt.NDArray[np.int16]]:
-    """Split lines at their vertices: (S, 2, 2) ends and (S,) levels."""
-    xy, line = shapely.get_coordinates(lines, return_index=True)
-    same = line[1:] == line[:-1]
-    segments = np.stack([xy[:-1], xy[1:]], axis=1)[same]
-    return segments, np.asarray(level, dtype=np.int16)[line[1:][same]]
-
-
-def _read_issues(path: Path, frame: Frame) -> tuple[Issue, ...]:
-    geometry, column = _read_layer(path, ISSUES.name, *ISSUES.column_names)
-    return tuple(
-        Issue(
-            code=str(column["code"][i]),
-            message=str(column["message"][i]),
-            part=_whole(column["part"][i]),
-            parcel_id=_whole(column["parcel_id"][i]),
-            value=_number(column["value"][i]),
-            limit=_number(column["limit"][i]),
-            geometry=None if place is None else _local(place, frame),
-        )
-        for i, place in enumerate(geometry)
-    )
-
-
-def _read_history(path: Path) -> tuple[Step, ...]:
-    _, column = _read_layer(path, PROVENANCE.name, *PROVENANCE.column_names)
-    return tuple(
-        Step(
-            algorithm=str(column["algorithm"][i]),
-            parameters=json.loads(column["parameters"][i]),
-            seed=int(column["seed"][i]),
-            version=str(column["version"][i]),
-            input_sha256=str(column["input_sha256"][i]),
-            seconds=float(column["seconds"][i]),
-        )
-        for i in np.argsort(column["step"], kind="stable")
-    )
-
-
-def _read_input(path: Path, frame: Frame) -> tuple[shapely.Polygon, ...]:
-    name = "input_boundary"
-    if name not in pyogrio.list_layers(path)[:, 0]:
-        return ()
-    geometry, _ = _read_layer(path, name, "part")
-    return tuple(_local(geometry, frame))
-
-
-def _whole(value: float | None) -> int | None:
-    number = _number(value)
-    return None if number is None else int(number)
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or math.isnan(value) else float(value)
+    return GeoLayout(files.read_layout(path, library=PYOGRIO))

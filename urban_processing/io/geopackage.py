@@ -1,11 +1,10 @@
-"""GeoPackages of tables: the same tables give the same bytes."""
+"""Layers of GeoPackages by pyogrio."""
 
 from __future__ import annotations
 
-import sqlite3
 import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,111 +12,52 @@ import numpy as np
 import numpy.typing as npt
 import pyogrio
 import shapely
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
-from urban_processing.io.styles import layer_style
+from urban_processing.layout_file.geopackage import (
+    FIXED_DATE,
+    GEOMETRY_COLUMN,
+    VERSION,
+    field_arrays,
+)
 from urban_processing.metrics.tables import Table
-from urban_processing.schema import LAYERS, Column, ColumnType, GeometryType, Layer
-
-VERSION = "1.3"
-"""GeoPackage version: the newest that QGIS 3.22 reads."""
-
-FIXED_DATE = "2000-01-01T00:00:00.000Z"
-"""Date that files carry in place of the day they were written on."""
-
-STATE_URI = "urn:urban-processing:layout"
-"""Standard of the metadata row that holds what the tables do not say. Metadata under GDAL's own
-standard would make GDAL leave an .aux.xml file beside the GeoPackage."""
-
-_GEOMETRY_COLUMN = "geom"
-
-_STYLE_TABLE = """
-CREATE TABLE "layer_styles" (
-  "id" INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
-  "f_table_catalog" TEXT(256), "f_table_schema" TEXT(256), "f_table_name" TEXT(256),
-  "f_geometry_column" TEXT(256), "styleName" TEXT(30), "styleQML" TEXT, "styleSLD" TEXT,
-  "useAsDefault" BOOLEAN, "description" TEXT, "owner" TEXT(30), "ui" TEXT(30),
-  "update_time" DATETIME)
-"""
-
-_METADATA_TABLES = """
-CREATE TABLE gpkg_metadata (
-  id INTEGER CONSTRAINT m_pk PRIMARY KEY ASC NOT NULL,
-  md_scope TEXT NOT NULL DEFAULT 'dataset', md_standard_uri TEXT NOT NULL,
-  mime_type TEXT NOT NULL DEFAULT 'text/xml', metadata TEXT NOT NULL DEFAULT '');
-CREATE TABLE gpkg_metadata_reference (
-  reference_scope TEXT NOT NULL, table_name TEXT, column_name TEXT, row_id_value INTEGER,
-  timestamp DATETIME NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')),
-  md_file_id INTEGER NOT NULL, md_parent_id INTEGER,
-  CONSTRAINT crmr_mfi_fk FOREIGN KEY (md_file_id) REFERENCES gpkg_metadata(id),
-  CONSTRAINT crmr_mpi_fk FOREIGN KEY (md_parent_id) REFERENCES gpkg_metadata(id));
-"""
-
-_COLUMN_TABLES = """
-CREATE TABLE gpkg_data_columns (
-  table_name TEXT NOT NULL, column_name TEXT NOT NULL, name TEXT, title TEXT,
-  description TEXT, mime_type TEXT, constraint_name TEXT,
-  CONSTRAINT pk_gdc PRIMARY KEY (table_name, column_name),
-  CONSTRAINT gdc_tn UNIQUE (table_name, name));
-CREATE TABLE gpkg_data_column_constraints (
-  constraint_name TEXT NOT NULL, constraint_type TEXT NOT NULL, value TEXT, min NUMERIC,
-  min_is_inclusive BOOLEAN, max NUMERIC, max_is_inclusive BOOLEAN, description TEXT,
-  CONSTRAINT gdcc_ntv UNIQUE (constraint_name, constraint_type, value));
-"""
+from urban_processing.schema import GeometryType, Layer
 
 
-def write_geopackage(path: Path, tables: Mapping[str, Table], *, crs: str, state: str) -> None:
-    """Write tables as the layers of a new GeoPackage, with QGIS styles and column names.
+class Pyogrio:
+    """Reads and writes layers with pyogrio; a `LayerLibrary`."""
 
-    Parameters
-    ----------
-    path
-        File to create.
-    tables
-        Tables by name of the layer, of layers in the schema; written in its order.
-    crs
-        CRS of the geometries as text, "" for none.
-    state
-        JSON kept in the file's metadata, for `read_state`.
-    """
-    layers = [layer for layer in LAYERS if layer.name in tables]
-    with _gdal_options(OGR_CURRENT_DATE=FIXED_DATE):
-        for layer in layers:
-            _write_layer(path, layer, tables[layer.name], crs=crs)
-    with closing(sqlite3.connect(path)) as connection, connection:
-        _write_state(connection, state)
-        _write_styles(connection, layers)
-        _write_column_names(connection, layers)
+    def write_layers(self, path: Path, tables: Mapping[Layer, Table], *, crs: str) -> None:
+        """Write tables as layers of a new GeoPackage."""
+        with _os_errors(), _gdal_options(OGR_CURRENT_DATE=FIXED_DATE):
+            for layer, table in tables.items():
+                _write_layer(path, layer, table, crs=crs)
 
+    def read_layer(
+        self, path: Path, layer: str, columns: Sequence[str]
+    ) -> tuple[npt.NDArray[np.object_], dict[str, npt.NDArray[Any]]]:
+        """Return geometries and columns of a layer in the order in which they were written."""
+        with _os_errors():
+            meta, _, wkb, values = pyogrio.raw.read(path, layer=layer, columns=list(columns))
+        found = dict(zip(meta["fields"].tolist(), values, strict=True))
+        geometry = np.empty(0, dtype=object) if wkb is None else shapely.from_wkb(wkb)
+        return np.asarray(geometry, dtype=object), {name: found[name] for name in columns}
 
-def field_arrays(
-    layer: Layer, table: Table
-) -> tuple[list[str], list[npt.NDArray[Any]], list[npt.NDArray[np.bool_] | None]]:
-    """Return names, values and masks of missing values of the columns of a table."""
-    names, values, masks = [], [], []
-    for column in layer.columns:
-        given = table.columns[column.name]
-        mask = None
-        if column.dtype in (ColumnType.INTEGER, ColumnType.REAL) and given.dtype.kind == "f":
-            missing = np.isnan(given)
-            if column.dtype is ColumnType.INTEGER:
-                given = np.where(missing, 0, given).astype(np.int64)
-            mask = missing if missing.any() else None
-        names.append(column.name)
-        values.append(given)
-        masks.append(mask)
-    return names, values, masks
+    def layer_names(self, path: Path) -> list[str]:
+        """Return the names of a file's layers."""
+        with _os_errors():
+            return [str(name) for name in pyogrio.list_layers(path)[:, 0]]
 
 
-def read_state(path: Path) -> str | None:
-    """Return the state of a file that `write_geopackage` wrote, None for any other file."""
+PYOGRIO = Pyogrio()
+
+
+@contextmanager
+def _os_errors() -> Iterator[None]:
     try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as connection:
-            row = connection.execute(
-                "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (STATE_URI,)
-            ).fetchone()
-    except sqlite3.DatabaseError:
-        return None  # no database, or one without metadata
-    return None if row is None else str(row[0])
+        yield
+    except (DataSourceError, DataLayerError, FeatureError, FieldError) as error:
+        raise OSError(str(error)) from error
 
 
 def _write_layer(path: Path, layer: Layer, table: Table, *, crs: str) -> None:
@@ -128,7 +68,7 @@ def _write_layer(path: Path, layer: Layer, table: Table, *, crs: str) -> None:
         kind = "Unknown" if layer.geometry is GeometryType.ANY else layer.geometry.value
         options |= {"geometry_type": kind, "crs": crs or None, "promote_to_multi": False}
         options["layer_options"] |= {
-            "GEOMETRY_NAME": _GEOMETRY_COLUMN,
+            "GEOMETRY_NAME": GEOMETRY_COLUMN,
             "SPATIAL_INDEX": "YES",
         }
     with warnings.catch_warnings():
@@ -145,76 +85,6 @@ def _write_layer(path: Path, layer: Layer, table: Table, *, crs: str) -> None:
             dataset_options={"VERSION": VERSION},
             **options,
         )
-
-
-def _write_state(connection: sqlite3.Connection, state: str) -> None:
-    connection.executescript(_METADATA_TABLES)
-    connection.execute(
-        "INSERT INTO gpkg_metadata VALUES (1, 'dataset', ?, 'application/json', ?)",
-        (STATE_URI, state),
-    )
-    connection.execute(
-        "INSERT INTO gpkg_metadata_reference VALUES ('geopackage', NULL, NULL, NULL, ?, 1, NULL)",
-        (FIXED_DATE,),
-    )
-    _register(
-        connection,
-        "gpkg_metadata",
-        "http://www.geopackage.org/spec120/#extension_metadata",
-        tables=("gpkg_metadata", "gpkg_metadata_reference"),
-    )
-
-
-def _register(
-    connection: sqlite3.Connection, extension: str, definition: str, *, tables: tuple[str, ...]
-) -> None:
-    connection.executemany(
-        "INSERT INTO gpkg_extensions VALUES (?, NULL, ?, ?, 'read-write')",
-        [(table, extension, definition) for table in tables],
-    )
-
-
-def _write_styles(connection: sqlite3.Connection, layers: list[Layer]) -> None:
-    """Add the table that QGIS looks for when it opens a layer."""
-    connection.execute(_STYLE_TABLE)
-    connection.execute(
-        "INSERT INTO gpkg_contents (table_name, data_type, identifier, description, last_change)"
-        " VALUES ('layer_styles', 'attributes', 'layer_styles', '', ?)",
-        (FIXED_DATE,),
-    )
-    for layer in layers:
-        qml = layer_style(layer.name, aliases={c.name: _alias(c) for c in layer.columns})
-        if qml is not None:
-            connection.execute(
-                "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name,"
-                " f_geometry_column, styleName, styleQML, styleSLD, useAsDefault, description,"
-                " owner, ui, update_time) VALUES ('', '', ?, ?, ?, ?, '', 1, ?, '', NULL, ?)",
-                (layer.name, _GEOMETRY_COLUMN, layer.name, qml, layer.title, FIXED_DATE),
-            )
-
-
-def _write_column_names(connection: sqlite3.Connection, layers: list[Layer]) -> None:
-    """Readable names and descriptions of columns, by the GeoPackage schema extension."""
-    connection.executescript(_COLUMN_TABLES)
-    _register(
-        connection,
-        "gpkg_schema",
-        "http://www.geopackage.org/spec121/#extension_schema",
-        tables=("gpkg_data_columns", "gpkg_data_column_constraints"),
-    )
-    connection.executemany(
-        "INSERT INTO gpkg_data_columns (table_name, column_name, name, title, description)"
-        " VALUES (?, ?, ?, ?, ?)",
-        [
-            (layer.name, c.name, _alias(c), _alias(c), c.description)
-            for layer in layers
-            for c in layer.columns
-        ],
-    )
-
-
-def _alias(column: Column) -> str:
-    return f"{column.alias} [{column.unit}]" if column.unit else column.alias
 
 
 @contextmanager

@@ -129,6 +129,5 @@ def draw_colour_bar(ax: Axes, colour_by: str, scale: Scale) -> None:
     inset = ax.inset_axes((0.38, -0.033 * scale.text / height, 0.3, 0.1 / height))
     bar = root_figure(ax).colorbar(ax.collections[0], cax=inset, orientation="horizontal")
     bar.outline.set_linewidth(0.4)
-    label = f"{column.alias} [{column.unit}]" if column.unit else column.alias
     inset.tick_params(labelsize=0.85 * scale.text, length=2, colors=INK)
-    inset.set_title(label, size=scale.text, color=INK, pad=3)
+    inset.set_title(column.label, size=scale.text, color=INK, pad=3)

@@ -125,7 +125,7 @@ def plot_layout(
 
 def check_map_output(path: str | PathLike[str]) -> list[str]:
     """Return why a map cannot be written to a path; nothing where it can."""
-    from urban_processing.io.files import folder_problems
+    from urban_processing.layout_file.files import folder_problems
 
     target = Path(path)
     problems = folder_problems(target.parent)

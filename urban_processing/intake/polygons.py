@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import BoundaryError
-from urban_processing.io.features import Features
+from urban_processing.intake.features import Features
 
 REPAIR_TOLERANCE = 0.05
 """An invalid polygon is repaired while that changes its area by no more than this share;
@@ -56,7 +57,7 @@ class _Report:
     notes: list[Note] = field(default_factory=list)
 
 
-def clean_polygons(features: Features) -> Cleaned:
+def clean_polygons(features: Features[Any]) -> Cleaned:
     """Return the united, valid land of some features.
 
     Raises
@@ -80,7 +81,9 @@ def clean_polygons(features: Features) -> Cleaned:
     return Cleaned(land, polygons, tuple(report.notes))
 
 
-def _polygons_of(features: Features, report: _Report) -> tuple[ObjectArray, npt.NDArray[np.int64]]:
+def _polygons_of(
+    features: Features[Any], report: _Report
+) -> tuple[ObjectArray, npt.NDArray[np.int64]]:
     """Single polygons without heights, and the row of the feature each comes from."""
     geometry = features.geometry
     name = features.name

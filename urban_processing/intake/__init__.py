@@ -1,0 +1,1 @@
+"""What a shell has read, made ready for the engine; which program read it does not matter."""

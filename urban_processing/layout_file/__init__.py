@@ -1,0 +1,1 @@
+"""What layout files hold besides their tables, and how a layout comes back from them."""

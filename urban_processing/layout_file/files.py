@@ -1,0 +1,304 @@
+"""Layout files: the GeoPackage that holds everything."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from urban_processing.errors import BoundaryError, OutputError, TopologyError
+from urban_processing.layout import Layout, Step
+from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
+from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
+from urban_processing.schema import INPUT_BOUNDARY, ISSUES, PARCELS, PROVENANCE, STREETS
+from urban_processing.site import FloatArray, Frame, Issue
+
+FILE_FORMAT = 1
+"""Number of the way in which layout files keep what the schema does not say."""
+
+SUFFIX = ".gpkg"
+_SIDE_FILES = ("-journal", "-wal")
+
+
+def write_layout(
+    layout: Layout,
+    path: str | PathLike[str],
+    *,
+    library: LayerLibrary,
+    overwrite: bool = False,
+    tables: Mapping[str, Table] | None = None,
+) -> Path:
+    """Write a layout as a GeoPackage with all its layers, styled for QGIS.
+
+    The file appears whole or not at all. The same layout gives the same bytes.
+
+    Parameters
+    ----------
+    layout
+        The layout, as `as_written` gives it.
+    path
+        File to write, ending in ``.gpkg``.
+    library
+        What writes the layers.
+    overwrite
+        Whether an existing file may be replaced.
+    tables
+        Tables of the layout, where they are at hand.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written there.
+    """
+    target = Path(path)
+    problems = check_output(target, overwrite=overwrite)
+    if problems:
+        raise OutputError(problems)
+    known = layout_tables(layout) if tables is None else tables
+    with _replacing(target) as temporary:
+        write_geopackage(
+            temporary, known, crs=layout.frame.crs, state=_state(layout), library=library
+        )
+    return target
+
+
+def as_written(layout: Layout, *, record_seconds: bool = False) -> Layout:
+    """Return a layout in the form that files hold: numbered canonically, without times.
+
+    With `record_seconds` its steps keep the time they took: then no two runs give the same.
+    """
+    return canonical(layout if record_seconds else timeless(layout))
+
+
+def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[str]:
+    """Return one sentence for each reason why a layout file cannot be written.
+
+    Meant to be asked before a long run.
+    """
+    target = Path(path)
+    problems = []
+    if target.suffix.lower() != SUFFIX:
+        problems.append(f"The output {target} must be a GeoPackage: end its name in {SUFFIX}.")
+    problems += folder_problems(target.parent)
+    if target.is_dir():
+        problems.append(f"The output {target} is a folder: give the name of a file.")
+    elif target.exists() and not overwrite:
+        problems.append(
+            f"The output {target} exists already: choose another name, or allow overwriting "
+            "(--overwrite)."
+        )
+    beside = [target.with_name(target.name + end) for end in _SIDE_FILES]
+    if any(file.exists() for file in beside):
+        named = " and ".join(file.name for file in beside if file.exists())
+        problems.append(
+            f"The output {target} is open in another program ({named} lies beside it): close it "
+            "there, or choose another name."
+        )
+    return problems
+
+
+def timeless(layout: Layout) -> Layout:
+    """Return the layout without how long its steps took, which no two runs share."""
+    steps = [dataclasses.replace(step, seconds=math.nan) for step in layout.history]
+    return layout.replace(history=tuple(steps))
+
+
+def folder_problems(folder: Path) -> list[str]:
+    """Return why nothing can be written into a folder; nothing where it can."""
+    if not folder.exists():
+        return [f"The folder {folder} does not exist: create it first."]
+    if not folder.is_dir():
+        return [f"{folder} is not a folder."]
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return [f"The folder {folder} is not writable: choose another, or change its rights."]
+    return []
+
+
+def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:
+    """Read a layout file; the layout is the one that was written.
+
+    Raises
+    ------
+    BoundaryError
+        If there is no such file, or it is no layout file.
+    TopologyError
+        If its parcels or streets were changed so that they no longer fit together.
+    """
+    source = Path(path)
+    state = _read_state(source)
+    x, y = state["origin"]
+    file = _File(source, Frame(state["crs"], (float(x), float(y))), library)
+    try:
+        parts = _read_parts(file, np.asarray(state["corners"], dtype=np.float64))
+        issues = _read_issues(file)
+        layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
+        return layout.replace(
+            corners_given=state["corners_given"],
+            history=_read_history(file),
+            input_parts=_read_input(file),
+        )
+    except TopologyError as error:
+        raise TopologyError(
+            [
+                f"The parcels and streets of {source} do not fit together any more; were they "
+                "edited?",
+                *error.problems,
+            ]
+        ) from error
+    except (OSError, KeyError, ValueError) as error:
+        raise BoundaryError(f"{source} is damaged or was changed: {error}") from error
+
+
+@dataclass(frozen=True)
+class _File:
+    """A layout file, the frame of its local coordinates, and what reads it."""
+
+    path: Path
+    frame: Frame
+    library: LayerLibrary
+
+    def layer(
+        self, name: str, *columns: str
+    ) -> tuple[npt.NDArray[np.object_], dict[str, npt.NDArray[Any]]]:
+        """Geometries in local coordinates and columns, in the order in which they were written."""
+        geometry, values = self.library.read_layer(self.path, name, columns)
+        return self.local(geometry), values
+
+    def local(self, geometry: Any) -> Any:
+        return shapely.transform(geometry, lambda xy: xy - np.asarray(self.frame.origin))
+
+
+@contextmanager
+def _replacing(target: Path) -> Iterator[Path]:
+    """Give a temporary file beside `target` that takes its place if all goes well."""
+    try:
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
+            temporary = Path(folder) / target.name
+            yield temporary
+            temporary.replace(target)
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written: {error}") from error
+
+
+def _state(layout: Layout) -> str:
+    """Return what the layers do not say about a layout, as JSON."""
+    return json.dumps(
+        {
+            "format": FILE_FORMAT,
+            "crs": layout.frame.crs,
+            "origin": list(layout.frame.origin),
+            "min_area": layout.min_area,
+            "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
+            "corners_given": layout.corners_given,
+        }
+    )
+
+
+def _read_state(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        raise BoundaryError(f"The file {path} does not exist.")
+    text = read_state(path)
+    if text is None:
+        raise BoundaryError(
+            f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."
+        )
+    state: dict[str, Any] = json.loads(text)
+    if state["format"] > FILE_FORMAT:
+        raise BoundaryError(
+            f"{path} was written by a newer version of this software: update to read it."
+        )
+    return state
+
+
+def _read_parts(file: _File, corners: FloatArray) -> LayoutParts:
+    polygons, parcel = file.layer(PARCELS.name, "parcel_id", "part", "level", "lineage", "locked")
+    order = np.argsort(parcel["parcel_id"], kind="stable")
+    lines, street = file.layer(STREETS.name, "level")
+    segments, level = _segments(lines, street["level"])
+    lineage = [int(text, 16) for text in parcel["lineage"]]
+    return LayoutParts(
+        polygons=polygons[order],
+        face_part=parcel["part"][order],
+        face_level=parcel["level"][order],
+        face_lineage=np.array(lineage, dtype=np.uint64)[order],
+        face_locked=parcel["locked"].astype(bool)[order],
+        segments=segments,
+        segment_level=level,
+        corners=corners.reshape(-1, 2),
+    )
+
+
+def _segments(
+    lines: npt.NDArray[np.object_], level: npt.NDArray[Any]
+) -> tuple[FloatArray, npt.NDArray[np.int16]]:
+    """Split lines at their vertices: (S, 2, 2) ends and (S,) levels."""
+    xy, line = shapely.get_coordinates(lines, return_index=True)
+    same = line[1:] == line[:-1]
+    segments = np.stack([xy[:-1], xy[1:]], axis=1)[same]
+    return segments, np.asarray(level, dtype=np.int16)[line[1:][same]]
+
+
+def _read_issues(file: _File) -> tuple[Issue, ...]:
+    geometry, column = file.layer(ISSUES.name, *ISSUES.column_names)
+    return tuple(
+        Issue(
+            code=str(column["code"][i]),
+            message=str(column["message"][i]),
+            part=_whole(column["part"][i]),
+            parcel_id=_whole(column["parcel_id"][i]),
+            value=_number(column["value"][i]),
+            limit=_number(column["limit"][i]),
+            geometry=place,
+        )
+        for i, place in enumerate(geometry)
+    )
+
+
+def _read_history(file: _File) -> tuple[Step, ...]:
+    _, column = file.layer(PROVENANCE.name, *PROVENANCE.column_names)
+    return tuple(
+        Step(
+            algorithm=str(column["algorithm"][i]),
+            parameters=json.loads(column["parameters"][i]),
+            seed=int(column["seed"][i]),
+            version=str(column["version"][i]),
+            input_sha256=str(column["input_sha256"][i]),
+            seconds=float(column["seconds"][i]),
+        )
+        for i in np.argsort(column["step"], kind="stable")
+    )
+
+
+def _read_input(file: _File) -> tuple[shapely.Polygon, ...]:
+    name = INPUT_BOUNDARY.name
+    if name not in file.library.layer_names(file.path):
+        return ()
+    geometry, _ = file.layer(name, "part")
+    return tuple(geometry)
+
+
+def _whole(value: float | None) -> int | None:
+    number = _number(value)
+    return None if number is None else int(number)
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else float(value)
