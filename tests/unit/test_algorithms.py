@@ -42,9 +42,9 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 @dataclass(frozen=True, kw_only=True)
 class Small(Params):
-    on: Annotated[bool, Param(help="On.")] = True
-    name: Annotated[str | None, Param(help="Name.", group="G", advanced=True)] = None
-    size: Annotated[float, Param(help="Size.", unit="m", above=0, maximum=9)] = 1.0
+    on: Annotated[bool, Param(help="On.", label="On")] = True
+    name: Annotated[str | None, Param(help="Name.", label="Name", group="G", advanced=True)] = None
+    size: Annotated[float, Param(help="Size.", label="Size", unit="m", above=0, maximum=9)] = 1.0
 
 
 def test_names_are_stable_lowercase_and_unique() -> None:
@@ -61,14 +61,14 @@ def test_an_unknown_name_gets_a_hint() -> None:
 
 def test_names_used_twice_are_refused() -> None:
     spec = get("cogenerate")
-    twice = Input(name="parcels", kind=InputKind.LAYOUT, help="")
+    twice = Input(name="parcels", kind=InputKind.LAYOUT, label="", help="")
     with pytest.raises(ValueError, match="parcels"):
         dataclasses.replace(spec, inputs=(*spec.inputs, twice))
 
 
 def test_a_view_needs_its_output() -> None:
     spec = get("cogenerate")
-    lost = Output(name="map", kind=OutputKind.MAP, help="", of="nothing")
+    lost = Output(name="map", kind=OutputKind.MAP, label="", help="", of="nothing")
     with pytest.raises(ValueError, match="map"):
         dataclasses.replace(spec, outputs=(*spec.outputs, lost))
 
@@ -94,6 +94,7 @@ def test_shells_show_the_same_names_defaults_and_limits(spec: AlgorithmSpec) -> 
         assert shown.get("minimum") == field.param.minimum
         assert shown.get("maximum") == field.param.maximum
         assert shown.get("exclusiveMinimum") == field.param.above
+        assert shown["title"] == field.param.label
         assert shown["description"] == field.param.help
         assert f"--{option_name(field.name)}" in option.opts
         assert option.help == field.param.help
@@ -117,8 +118,14 @@ def test_limits_are_said_in_words() -> None:
 
 def test_json_schema_of_all_kinds_of_fields() -> None:
     properties = parameters_schema(Small)["properties"]
-    assert properties["on"] == {"description": "On.", "type": "boolean", "default": True}
+    assert properties["on"] == {
+        "title": "On",
+        "description": "On.",
+        "type": "boolean",
+        "default": True,
+    }
     assert properties["name"] == {
+        "title": "Name",
         "description": "Name.",
         "type": ["string", "null"],
         "default": None,
@@ -137,6 +144,7 @@ def test_the_description_is_plain_json() -> None:
     assert described["outputs"][1] == {
         "name": "plot",
         "kind": "map",
+        "label": "Map",
         "help": "A map of the layout.",
         "required": False,
         "of": "output",

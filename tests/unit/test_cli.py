@@ -30,8 +30,8 @@ from urban_processing.algorithms import (
     get,
     specs,
 )
+from urban_processing.algorithms.words import duration_in_words
 from urban_processing.cli.app import app, make_app
-from urban_processing.cli.summary import duration
 from urban_processing.errors import Cancelled, DependencyError, InfeasibleError
 from urban_processing.io.files import read_layout
 from urban_processing.layout import Layout
@@ -246,7 +246,7 @@ def test_a_large_run_is_announced_with_a_warning(
 
 
 def test_durations_are_said_as_people_say_them() -> None:
-    said = [duration(seconds) for seconds in (0.01, 3.21, 59.4, 75, 3600, 8000)]
+    said = [duration_in_words(seconds) for seconds in (0.01, 3.21, 59.4, 75, 3600, 8000)]
     assert said == ["0.1 s", "3.2 s", "59 s", "1 min 15 s", "1 h 0 min", "2 h 13 min"]
 
 
@@ -535,8 +535,18 @@ def test_a_spec_that_goes_on_from_a_layout_needs_no_new_code(land: Path, tmp_pat
         summary="Halve the smallest area.",
         description="A layout in, a layout out.",
         params=CogenerateParams,
-        inputs=(Input(name="layout", kind=InputKind.LAYOUT, help="A layout file."),),
-        outputs=(Output(name="output", kind=OutputKind.LAYOUT, help="The layout.", required=True),),
+        inputs=(
+            Input(name="layout", kind=InputKind.LAYOUT, label="Layout", help="A layout file."),
+        ),
+        outputs=(
+            Output(
+                name="output",
+                kind=OutputKind.LAYOUT,
+                label="Layout",
+                help="The layout.",
+                required=True,
+            ),
+        ),
         run=rerun,
     )
     command = make_app((get("cogenerate"), spec))

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urban_processing.errors import ParameterError
-from urban_processing.params import CogenerateParams, Param, Params, Preset, StreetPattern
+from urban_processing.params import CogenerateParams, Naming, Param, Params, Preset, StreetPattern
 
 
 class Colour(enum.StrEnum):
@@ -24,12 +24,14 @@ class Colour(enum.StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Sample(Params):
-    width: Annotated[float, Param(help="Width.", unit="m", above=0, maximum=10)] = 2.0
-    count: Annotated[int | None, Param(help="Count.", minimum=1)] = None
-    colour: Annotated[Colour, Param(help="Colour.")] = Colour.RED
-    flat: Annotated[bool, Param(help="Flat.")] = False
+    width: Annotated[float, Param(help="Width.", label="Width", unit="m", above=0, maximum=10)] = (
+        2.0
+    )
+    count: Annotated[int | None, Param(help="Count.", label="Count", minimum=1)] = None
+    colour: Annotated[Colour, Param(help="Colour.", label="Colour")] = Colour.RED
+    flat: Annotated[bool, Param(help="Flat.", label="Flat")] = False
 
-    def contradictions(self) -> list[str]:
+    def contradictions(self, called: Naming) -> list[str]:
         return ["wide and flat"] if self.flat and self.width > 5 else []
 
 
@@ -148,3 +150,17 @@ def test_presets_give_the_weights_that_are_not_given() -> None:
     assert chen.weights == (0.9, 0.5, 0.2)
     assert chen.weights != CogenerateParams(parcels=5, weight_size=0.9).weights
     assert chen.pattern is StreetPattern.LOOP
+
+
+def test_mistakes_are_told_with_the_names_that_the_user_knows() -> None:
+    said = CogenerateParams.problems_with({"min_area": -1, "parcels": 3}, lambda name: f"<{name}>")
+    assert said == [
+        "<min_area> must be above 0 m²; got -1.",
+        "Give <min_area> or <parcels>, not both.",
+    ]
+
+
+def test_readable_names_are_unique() -> None:
+    labels = [field.param.label for field in CogenerateParams.fields()]
+    assert all(labels)
+    assert len(set(labels)) == len(labels)

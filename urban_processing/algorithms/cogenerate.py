@@ -49,11 +49,13 @@ COGENERATE = AlgorithmSpec(
         Input(
             name="boundary",
             kind=InputKind.BOUNDARY,
+            label="Land",
             help="The land: a file with polygons, of any vector format.",
         ),
         Input(
             name="corners",
             kind=InputKind.CORNER_POINTS,
+            label="Corners of the land",
             help="Points near the boundary that are to count as corners of a freeform land; "
             "by default corners are found by angle.",
             required=False,
@@ -63,13 +65,17 @@ COGENERATE = AlgorithmSpec(
         Output(
             name="output",
             kind=OutputKind.LAYOUT,
+            label="Layout file",
             help="The layout: a GeoPackage with parcels, streets, junctions, metrics and styles.",
             required=True,
         ),
-        Output(name="plot", kind=OutputKind.MAP, help="A map of the layout.", of="output"),
+        Output(
+            name="plot", kind=OutputKind.MAP, label="Map", help="A map of the layout.", of="output"
+        ),
         Output(
             name="export",
             kind=OutputKind.EXPORT,
+            label="Plain files",
             help="A folder for one plain file of each layer.",
             of="output",
         ),

@@ -41,11 +41,23 @@ def description(spec: AlgorithmSpec) -> dict[str, Any]:
         "summary": spec.summary,
         "description": spec.description,
         "inputs": [
-            {"name": i.name, "kind": i.kind.value, "help": i.help, "required": i.required}
+            {
+                "name": i.name,
+                "kind": i.kind.value,
+                "label": i.label,
+                "help": i.help,
+                "required": i.required,
+            }
             for i in spec.inputs
         ],
         "outputs": [
-            {"name": o.name, "kind": o.kind.value, "help": o.help, "required": o.required}
+            {
+                "name": o.name,
+                "kind": o.kind.value,
+                "label": o.label,
+                "help": o.help,
+                "required": o.required,
+            }
             | ({"of": o.of} if o.of else {})
             for o in spec.outputs
         ],
@@ -56,7 +68,7 @@ def description(spec: AlgorithmSpec) -> dict[str, Any]:
 
 def _property(field: ParamField) -> dict[str, Any]:
     param = field.param
-    out: dict[str, Any] = {"description": param.help}
+    out: dict[str, Any] = {"title": param.label, "description": param.help}
     if issubclass(field.kind, enum.Enum):
         choices: list[Any] = [member.value for member in field.kind]
         out["enum"] = [*choices, None] if field.optional else choices

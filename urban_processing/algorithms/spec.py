@@ -48,6 +48,8 @@ class Input:
         Its key in the mapping given to `AlgorithmSpec.run`.
     kind
         What it is.
+    label
+        Readable name, as in dialogs.
     help
         One sentence for the user.
     required
@@ -56,6 +58,7 @@ class Input:
 
     name: str
     kind: InputKind
+    label: str
     help: str
     required: bool = True
 
@@ -70,6 +73,8 @@ class Output:
         Its key in the mapping that `AlgorithmSpec.run` returns, if `of` is empty.
     kind
         What it is.
+    label
+        Readable name, as in dialogs.
     help
         One sentence for the user.
     required
@@ -81,6 +86,7 @@ class Output:
 
     name: str
     kind: OutputKind
+    label: str
     help: str
     required: bool = False
     of: str = ""

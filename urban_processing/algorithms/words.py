@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 
+from urban_processing.algorithms.spec import Estimate
 from urban_processing.params.base import ParamField
 
 _KINDS = {bool: "yes or no", int: "whole number", float: "number", str: "text"}
@@ -43,3 +44,24 @@ def default_in_words(field: ParamField) -> str:
     if isinstance(default, bool):
         return "yes" if default else "no"
     return f"{default:g}" if isinstance(default, float) else str(default)
+
+
+def estimate_in_words(estimate: Estimate) -> str:
+    """Return what a run will make and take: ``about 1,200 parcels, about 2.2 s``."""
+    return f"about {estimate.parcels:,} parcels, about {duration_in_words(estimate.seconds)}"
+
+
+def duration_in_words(seconds: float) -> str:
+    """Return a time as one would say it.
+
+    >>> [duration_in_words(s) for s in (0.2, 3.21, 75, 8000)]
+    ['0.2 s', '3.2 s', '1 min 15 s', '2 h 13 min']
+    """
+    if seconds < 10:
+        return f"{max(seconds, 0.1):.1f} s"
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    whole = round(seconds)
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -12,9 +12,9 @@ from urban_processing.algorithms.spec import (
     InputKind,
     OutputKind,
 )
+from urban_processing.algorithms.words import duration_in_words, estimate_in_words
 from urban_processing.cli import stores
 from urban_processing.cli.call import Call, prepare
-from urban_processing.cli.summary import duration, promises_broken, summary
 from urban_processing.cli.terminal import Terminal
 from urban_processing.errors import InfeasibleError
 from urban_processing.progress import MANY_PARCELS
@@ -35,6 +35,8 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
         With everything that is wrong with the call, why the run failed, or what of the
         certificate does not hold.
     """
+    from urban_processing.metrics import MeasuredLayout
+
     call = prepare(spec, given)
     _say_what_inputs_say(spec, call, terminal)
     if spec.estimate is not None:
@@ -42,17 +44,19 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
     started = time.perf_counter()
     with terminal.progress(spec.title) as progress:
         made = spec.run(call.inputs, call.params, progress)
-    rows = [("time", duration(time.perf_counter() - started))]
+    rows = [("time", duration_in_words(time.perf_counter() - started))]
     files = []
     for output in spec.outputs:
         if given[output.name] is not None:
             stored = made[output.of or output.name]
             files.append((_FILE_NAMES[output.kind], str(stores.write(output, stored, given))))
+    broken = []
     for output in spec.outputs:
-        if not output.of:
-            rows = [*summary(output.kind, made[output.name]), *rows]
+        if output.kind is OutputKind.LAYOUT:
+            measured = MeasuredLayout(made[output.name])
+            rows = [*measured.summary(), *rows]
+            broken += [check.message for check in measured.certificate.failures]
     terminal.table([*rows, *files])
-    broken = [p for o in spec.outputs if not o.of for p in promises_broken(o.kind, made[o.name])]
     if broken:
         raise InfeasibleError(
             ["The layout was written, but not all that it promises holds:", *broken]
@@ -68,7 +72,7 @@ def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) ->
 
 
 def _announce(estimate: Estimate, terminal: Terminal) -> None:
-    what = f"about {estimate.parcels:,} parcels, about {duration(estimate.seconds)}"
+    what = estimate_in_words(estimate)
     if estimate.parcels > MANY_PARCELS:
         terminal.warn(
             f"This run is large: {what}. A larger smallest area, or fewer parcels, is quicker; "

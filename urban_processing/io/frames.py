@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,7 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 
-from urban_processing.layout import Layout
-from urban_processing.metrics import Certificate, LayoutMeasures, Table, certificate, layout_tables
+from urban_processing.metrics import MeasuredLayout, Table
 from urban_processing.schema import ColumnType, GeometryType, layer
 
 if TYPE_CHECKING:
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class GeoLayout:
+class GeoLayout(MeasuredLayout):
     """A layout of parcels and streets, its layers as GeoDataFrames in map coordinates.
 
     Parameters
@@ -39,8 +37,6 @@ class GeoLayout:
     >>> layout.parcels.area_m2.min() >= 2000  # doctest: +SKIP
     True
     """
-
-    layout: Layout
 
     @property
     def parcels(self) -> gpd.GeoDataFrame:
@@ -82,34 +78,14 @@ class GeoLayout:
         """Steps that made the layout, with their parameters and seed."""
         return self.frame("provenance")
 
-    @cached_property
-    def certificate(self) -> Certificate:
-        """Checks on the geometry that every promise of a layout holds."""
-        return certificate(self.layout)
-
     @property
     def crs(self) -> Any:
         """CRS of the geometries, None for a plane without CRS."""
         return self.boundary.crs
 
-    @cached_property
-    def tables(self) -> dict[str, Table]:
-        """All layers as plain arrays, as they are written to files."""
-        return layout_tables(self.layout, measures=LayoutMeasures(self.layout))
-
     def frame(self, name: str) -> gpd.GeoDataFrame | pd.DataFrame:
         """Return a layer of the schema as a frame of its own; empty if the layout has none."""
         return table_frame(name, self.tables.get(name), crs=self.layout.frame.crs)
-
-    def metric(self, name: str, *, part: int | None = None) -> float:
-        """Return one metric of the whole, or of a part; `KeyError` if there is none."""
-        table = self.tables["metrics"]
-        of_part = np.isnan(table["part"]) if part is None else table["part"] == part
-        found = np.flatnonzero(of_part & (table["metric"] == name))
-        if not len(found):
-            scope = "" if part is None else f" of part {part}"
-            raise KeyError(f"There is no metric {name!r}{scope}.")
-        return float(table["value"][found[0]])
 
     def plot(
         self,

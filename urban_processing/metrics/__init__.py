@@ -1,6 +1,7 @@
 """Measures of a layout, its tables, and the certificate that it is what was promised."""
 
 from urban_processing.metrics.certificate import Certificate, Check, certificate, certify
+from urban_processing.metrics.measured import MeasuredLayout
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
 from urban_processing.metrics.tables import Table, layout_tables
@@ -9,6 +10,7 @@ __all__ = [
     "Certificate",
     "Check",
     "LayoutMeasures",
+    "MeasuredLayout",
     "Metric",
     "ParcelMeasures",
     "Table",

@@ -8,7 +8,7 @@ import enum
 import math
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -20,6 +20,8 @@ class Param:
     """What a parameter means, its unit and its limits (inclusive unless said otherwise)."""
 
     help: str
+    label: str
+    """Readable name, as in dialogs."""
     unit: str = ""
     minimum: float | None = None
     maximum: float | None = None
@@ -51,20 +53,26 @@ class Params:
     """
 
     def __post_init__(self) -> None:
-        problems: list[str] = []
-        for field in self.fields():
-            value = _converted(field, getattr(self, field.name), problems)
-            object.__setattr__(self, field.name, value)
-        problems += self.contradictions()
+        problems = self._convert(option_name)
         if problems:
             raise ParameterError(problems)
 
-    def contradictions(self) -> list[str]:
+    def _convert(self, called: Naming) -> list[str]:
+        """Convert the values to their declared types; return what is wrong with them."""
+        problems: list[str] = []
+        for field in self.fields():
+            value = _converted(field, getattr(self, field.name), called(field.name), problems)
+            object.__setattr__(self, field.name, value)
+        return problems + self.contradictions(called)
+
+    def contradictions(self, called: Naming) -> list[str]:
         """Return one sentence for each set of values that do not go together.
 
         Called even where single values are wrong, so that everything is reported at once: a
-        value of the wrong kind stands there as NaN (a number) or as its default.
+        value of the wrong kind stands there as NaN (a number) or as its default. `called`
+        gives the name of a parameter as the user knows it.
         """
+        del called
         return []
 
     @classmethod
@@ -82,24 +90,29 @@ class Params:
         ParameterError
             With one sentence for each mistake.
         """
-        known = {field.name for field in cls.fields()}
-        unknown = [_unknown(name, known) for name in values if name not in known]
-        try:
-            params = cls(**{name: values[name] for name in values if name in known})
-        except ParameterError as error:
-            raise ParameterError([*unknown, *error.problems]) from None
-        if unknown:
-            raise ParameterError(unknown)
-        return params
+        problems = cls.problems_with(values)
+        if problems:
+            raise ParameterError(problems)
+        return cls(**values)
 
     @classmethod
-    def problems_with(cls, values: Mapping[str, Any]) -> list[str]:
-        """Return the sentences that creating an instance from `values` would raise."""
-        try:
-            cls.from_values(values)
-        except ParameterError as error:
-            return list(error.problems)
-        return []
+    def problems_with(cls, values: Mapping[str, Any], called: Naming | None = None) -> list[str]:
+        """Return the sentences that creating an instance from `values` would raise.
+
+        Parameters
+        ----------
+        values
+            Values by name.
+        called
+            Gives the name of a parameter as the user knows it; by default `option_name`.
+        """
+        fields = cls.fields()
+        known = {field.name for field in fields}
+        unknown = [_unknown(name, known) for name in values if name not in known]
+        draft = object.__new__(cls)
+        for field in fields:
+            object.__setattr__(draft, field.name, values.get(field.name, field.default))
+        return [*unknown, *draft._convert(called or option_name)]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values as plain JSON types."""
@@ -112,6 +125,10 @@ class Params:
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some values changed, validated again."""
         return dataclasses.replace(self, **changes)
+
+
+Naming = Callable[[str], str]
+"""Gives the name of a parameter as the user knows it."""
 
 
 def _field(name: str, hint: Any, default: Any) -> ParamField:
@@ -135,9 +152,8 @@ def _unknown(name: str, known: Iterable[str]) -> str:
     return f"There is no parameter {option_name(name)}.{hint}"
 
 
-def _converted(field: ParamField, value: Any, problems: list[str]) -> Any:
+def _converted(field: ParamField, value: Any, name: str, problems: list[str]) -> Any:
     """Return `value` as the declared type; append to `problems` what is wrong with it."""
-    name = option_name(field.name)
     if value is None:
         if not field.optional:
             problems.append(f"{name} is missing.")
@@ -155,12 +171,11 @@ def _converted(field: ParamField, value: Any, problems: list[str]) -> Any:
             problems.append(f"{name} must be {field.kind.__name__}; got {value!r}.")
             return field.default
         return value
-    return _number(field, value, problems)
+    return _number(field, value, name, problems)
 
 
-def _number(field: ParamField, value: Any, problems: list[str]) -> float | int:
+def _number(field: ParamField, value: Any, name: str, problems: list[str]) -> float | int:
     """Return `value` as a number inside its limits, NaN where it is no such number."""
-    name = option_name(field.name)
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -172,15 +187,14 @@ def _number(field: ParamField, value: Any, problems: list[str]) -> float | int:
     if field.kind is int and number != math.floor(number):
         problems.append(f"{name} must be a whole number; got {value}.")
         return math.nan
-    problems += _limits_broken(field, number, value)
+    problems += _limits_broken(field.param, number, value, name)
     if field.kind is float:
         return number
     decimal_text = isinstance(value, str) and not value.strip().lstrip("+-").isdigit()
     return int(number) if decimal_text else int(value)
 
 
-def _limits_broken(field: ParamField, number: float, value: Any) -> list[str]:
-    name, param = option_name(field.name), field.param
+def _limits_broken(param: Param, number: float, value: Any, name: str) -> list[str]:
     unit = f" {param.unit}" if param.unit else ""
     problems = []
     if param.above is not None and number <= param.above:

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 from typing import Annotated
 
-from urban_processing.params.base import Param, Params
+from urban_processing.params.base import Naming, Param, Params
 
 
 class StreetPattern(enum.StrEnum):
@@ -34,6 +34,7 @@ class CogenerateParams(Params):
     min_area: Annotated[
         float | None,
         Param(
+            label="Smallest parcel",
             help="Smallest parcel allowed; give this or the number of parcels.",
             unit="m²",
             above=0,
@@ -43,6 +44,7 @@ class CogenerateParams(Params):
     parcels: Annotated[
         int | None,
         Param(
+            label="Number of parcels",
             help="Number of parcels wanted (reached within 3 %); give this or the smallest area.",
             minimum=1,
             group=_SIZE,
@@ -51,6 +53,7 @@ class CogenerateParams(Params):
     pattern: Annotated[
         StreetPattern,
         Param(
+            label="Street pattern",
             help="Street pattern: loops without dead ends, dead ends in the last levels, or a "
             "tree that keeps all its dead ends.",
             group=_STREETS,
@@ -62,11 +65,15 @@ class CogenerateParams(Params):
         ),
     ] = StreetPattern.LOOP
     seed: Annotated[
-        int, Param(help="Random seed; the same seed gives the same bytes.", minimum=0)
+        int,
+        Param(
+            label="Random seed", help="Random seed; the same seed gives the same bytes.", minimum=0
+        ),
     ] = 0
     simplify: Annotated[
         float | None,
         Param(
+            label="Tolerance of the boundary",
             help="Tolerance of the simplification of the boundary; by default 0.3 of the side "
             "of the smallest parcel; 0 keeps every vertex.",
             unit="m",
@@ -77,6 +84,7 @@ class CogenerateParams(Params):
     orientation: Annotated[
         float | None,
         Param(
+            label="Direction of parcels",
             help="Preferred direction of the long side of parcels, counter-clockwise from "
             "east (0 = east-west, 90 = north-south).",
             unit="°",
@@ -88,6 +96,7 @@ class CogenerateParams(Params):
     preset: Annotated[
         Preset,
         Param(
+            label="Weights and rules",
             help="Weights and rules to start from: the recommended ones, or those printed in "
             "Chen et al. 2024.",
             labels={"recommended": "Recommended", "chen2024": "Chen et al. 2024, as printed"},
@@ -96,6 +105,7 @@ class CogenerateParams(Params):
     weight_size: Annotated[
         float | None,
         Param(
+            label="Weight of equal size (λ1)",
             help="λ1: how much parcels of equal size count in choosing a cut.",
             minimum=0,
             advanced=True,
@@ -105,6 +115,7 @@ class CogenerateParams(Params):
     weight_regularity: Annotated[
         float | None,
         Param(
+            label="Weight of regular shape (λ2)",
             help="λ2: how much regular parcels count in choosing a cut.",
             minimum=0,
             advanced=True,
@@ -114,6 +125,7 @@ class CogenerateParams(Params):
     weight_access: Annotated[
         float | None,
         Param(
+            label="Weight of street access (λ3)",
             help="λ3: how much street access of both halves counts in choosing a cut.",
             minimum=0,
             advanced=True,
@@ -123,6 +135,7 @@ class CogenerateParams(Params):
     weight_continuity: Annotated[
         float | None,
         Param(
+            label="Weight of continued cuts",
             help="How much continuing a neighbour's cut counts in choosing a cut.",
             minimum=0,
             advanced=True,
@@ -132,6 +145,7 @@ class CogenerateParams(Params):
     weight_orientation: Annotated[
         float,
         Param(
+            label="Weight of the direction",
             help="How much the preferred orientation counts, where one is given: with 0.3, "
             "parcels of 1.6 : 1 along it are ideal.",
             minimum=0,
@@ -142,6 +156,7 @@ class CogenerateParams(Params):
     access_ratio: Annotated[
         float,
         Param(
+            label="Access ratio (τ)",
             help="τ: street access over mean side length from which a half counts as reached.",
             minimum=0,
             advanced=True,
@@ -151,6 +166,7 @@ class CogenerateParams(Params):
     candidates: Annotated[
         int,
         Param(
+            label="Candidates per parcel",
             help="Number of streamline candidates for each parcel.",
             minimum=4,
             maximum=200,
@@ -161,6 +177,7 @@ class CogenerateParams(Params):
     length_weight: Annotated[
         float,
         Param(
+            label="Weight of street length",
             help="How much street length counts in connecting streets.",
             above=0,
             advanced=True,
@@ -170,6 +187,7 @@ class CogenerateParams(Params):
     junction_weight: Annotated[
         float,
         Param(
+            label="Weight of street turns",
             help="How much a turn counts in connecting streets, in parcel sides of length.",
             minimum=0,
             advanced=True,
@@ -179,6 +197,7 @@ class CogenerateParams(Params):
     cul_de_sac_levels: Annotated[
         int,
         Param(
+            label="Levels of cul-de-sacs",
             help="Number of last levels whose dead ends are kept in the cul-de-sac pattern.",
             minimum=1,
             advanced=True,
@@ -186,16 +205,18 @@ class CogenerateParams(Params):
         ),
     ] = 3
 
-    def contradictions(self) -> list[str]:
+    def contradictions(self, called: Naming) -> list[str]:
         """Return what contradicts: the two sizes, and weights that are all zero."""
         problems = []
+        area, number = called("min_area"), called("parcels")
         if self.min_area is None and self.parcels is None:
-            problems.append("Give min-area (m²) or parcels (a number): one of the two is needed.")
+            problems.append(f"Give {area} (m²) or {number} (a number): one of the two is needed.")
         if self.min_area is not None and self.parcels is not None:
-            problems.append("Give min-area or parcels, not both.")
+            problems.append(f"Give {area} or {number}, not both.")
         if self.weights == (0.0, 0.0, 0.0):
+            size, shape, access = map(called, ("weight_size", "weight_regularity", "weight_access"))
             problems.append(
-                "weight-size, weight-regularity and weight-access are all zero: "
+                f"{size}, {shape} and {access} are all zero: "
                 "give at least one of them a positive value."
             )
         return problems
