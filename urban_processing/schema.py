@@ -63,12 +63,27 @@ class Column:
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer of a layout file."""
+    """One layer of a layout file.
+
+    Parameters
+    ----------
+    name
+        Name in files.
+    geometry
+        Kind of its geometries.
+    columns
+        Its attributes in order.
+    title
+        Readable name.
+    shown
+        Whether a toolbox that makes single layers makes this one unless told otherwise.
+    """
 
     name: str
     geometry: GeometryType
     columns: tuple[Column, ...]
     title: str
+    shown: bool = False
 
     @property
     def column_names(self) -> tuple[str, ...]:
@@ -174,6 +189,7 @@ PARCELS = Layer(
         _text("lineage", "Lineage", "Path in the tree of cuts, hashed to 16 hexadecimal digits."),
     ),
     "Parcels",
+    shown=True,
 )
 
 STREETS = Layer(
@@ -193,6 +209,7 @@ STREETS = Layer(
         _integer("to_junction", "To", "Junction or end at its end; none on a ring.", nullable=True),
     ),
     "Streets",
+    shown=True,
 )
 
 JUNCTIONS = Layer(
@@ -212,6 +229,7 @@ JUNCTIONS = Layer(
         ),
     ),
     "Junctions and street ends",
+    shown=True,
 )
 
 BOUNDARY = Layer(
@@ -248,6 +266,7 @@ ISSUES = Layer(
         _real("limit", "Limit", "Value that was to be kept.", nullable=True),
     ),
     "Issues",
+    shown=True,
 )
 
 METRICS = Layer(
@@ -292,6 +311,11 @@ LAYERS: tuple[Layer, ...] = (
     PROVENANCE,
 )
 """All layers, in the order in which a file lists them."""
+
+LAID_OUT: tuple[Layer, ...] = tuple(
+    layer for layer in LAYERS if layer not in (OBSTACLES, RIGHT_OF_WAY, NET_PARCELS)
+)
+"""Layers that a layout can have at present."""
 
 _BY_NAME = {layer.name: layer for layer in LAYERS}
 

@@ -7,6 +7,7 @@ the shell works with: pyproj, or QGIS.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -27,6 +28,8 @@ METRE_TOLERANCE = 1e-4
 
 LOCAL_NAME = "Local Lambert azimuthal equal-area"
 WGS84 = "EPSG:4326"
+
+_LOCAL_PLACE = re.compile(rf"{LOCAL_NAME} ([\d.]+)([NS]) ([\d.]+)([EW])")
 
 FloatArray = npt.NDArray[np.float64]
 C = TypeVar("C")
@@ -182,6 +185,20 @@ def local_equal_area(lon: float, lat: float) -> str:
         f'PARAMETER["False easting",0,{metre},ID["EPSG",8806]],'
         f'PARAMETER["False northing",0,{metre},ID["EPSG",8807]]],CS[Cartesian,2],'
         f'AXIS["(E)",east,ORDER[1],{metre}],AXIS["(N)",north,ORDER[2],{metre}]]'
+    )
+
+
+def local_equal_area_again(name: str) -> str | None:
+    """Return the WKT of a `local_equal_area` projection by its name, None for other names.
+
+    Other programs write the projection in other words, but keep its name.
+    """
+    found = _LOCAL_PLACE.fullmatch(name)
+    if found is None:
+        return None
+    lat, south, lon, west = found.groups()
+    return local_equal_area(
+        -float(lon) if west == "W" else float(lon), -float(lat) if south == "S" else float(lat)
     )
 
 

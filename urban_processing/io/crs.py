@@ -9,7 +9,7 @@ from pyproj.exceptions import CRSError
 
 from urban_processing.errors import BoundaryError
 from urban_processing.intake import crs_choice
-from urban_processing.intake.crs_choice import LOCAL_NAME, CrsFacts, FloatArray, local_equal_area
+from urban_processing.intake.crs_choice import CrsFacts, FloatArray, local_equal_area_again
 
 WGS84 = pyproj.CRS.from_user_input(crs_choice.WGS84)
 
@@ -95,16 +95,4 @@ def crs_text(crs: pyproj.CRS) -> str:
         code = ":".join(found)
         if pyproj.CRS.from_user_input(code).equals(crs, ignore_axis_order=True):
             return code
-    centre = _local_centre(crs)
-    return str(crs.to_wkt("WKT2_2019")) if centre is None else local_equal_area(*centre)
-
-
-def _local_centre(crs: pyproj.CRS) -> tuple[float, float] | None:
-    """Centre (lon, lat) of a `local_equal_area` projection, also after it was in a file."""
-    if not crs.name.startswith(LOCAL_NAME) or crs.coordinate_operation is None:
-        return None
-    values = {p.name: p.value for p in crs.coordinate_operation.params}
-    names = "Longitude of natural origin", "Latitude of natural origin"
-    if not all(name in values for name in names):
-        return None
-    return float(values[names[0]]), float(values[names[1]])
+    return local_equal_area_again(crs.name) or str(crs.to_wkt("WKT2_2019"))

@@ -14,9 +14,10 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from urban_processing.errors import DependencyError, OutputError, ParameterError
 from urban_processing.io.frames import table_frame
 from urban_processing.layout import Layout
-from urban_processing.layout_file.files import as_written, folder_problems
+from urban_processing.layout_file.files import as_written
 from urban_processing.layout_file.geopackage import field_arrays
 from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.paths import folder_problems
 from urban_processing.schema import LAYERS, GeometryType, Layer
 
 COORDINATE_DIGITS = "9"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -22,15 +21,13 @@ from urban_processing.errors import BoundaryError, OutputError, TopologyError
 from urban_processing.layout import Layout, Step
 from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
 from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.paths import geopackage_problems
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.schema import INPUT_BOUNDARY, ISSUES, PARCELS, PROVENANCE, STREETS
 from urban_processing.site import FloatArray, Frame, Issue
 
 FILE_FORMAT = 1
 """Number of the way in which layout files keep what the schema does not say."""
-
-SUFFIX = ".gpkg"
-_SIDE_FILES = ("-journal", "-wal")
 
 
 def write_layout(
@@ -94,23 +91,11 @@ def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[
     Meant to be asked before a long run.
     """
     target = Path(path)
-    problems = []
-    if target.suffix.lower() != SUFFIX:
-        problems.append(f"The output {target} must be a GeoPackage: end its name in {SUFFIX}.")
-    problems += folder_problems(target.parent)
-    if target.is_dir():
-        problems.append(f"The output {target} is a folder: give the name of a file.")
-    elif target.exists() and not overwrite:
+    problems = geopackage_problems(target)
+    if target.is_file() and not overwrite:
         problems.append(
             f"The output {target} exists already: choose another name, or allow overwriting "
             "(--overwrite)."
-        )
-    beside = [target.with_name(target.name + end) for end in _SIDE_FILES]
-    if any(file.exists() for file in beside):
-        named = " and ".join(file.name for file in beside if file.exists())
-        problems.append(
-            f"The output {target} is open in another program ({named} lies beside it): close it "
-            "there, or choose another name."
         )
     return problems
 
@@ -119,17 +104,6 @@ def timeless(layout: Layout) -> Layout:
     """Return the layout without how long its steps took, which no two runs share."""
     steps = [dataclasses.replace(step, seconds=math.nan) for step in layout.history]
     return layout.replace(history=tuple(steps))
-
-
-def folder_problems(folder: Path) -> list[str]:
-    """Return why nothing can be written into a folder; nothing where it can."""
-    if not folder.exists():
-        return [f"The folder {folder} does not exist: create it first."]
-    if not folder.is_dir():
-        return [f"{folder} is not a folder."]
-    if not os.access(folder, os.W_OK | os.X_OK):
-        return [f"The folder {folder} is not writable: choose another, or change its rights."]
-    return []
 
 
 def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:

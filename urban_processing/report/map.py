@@ -20,6 +20,7 @@ from matplotlib.path import Path as Outline
 from urban_processing.errors import OutputError, ParameterError
 from urban_processing.layout import Layout
 from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.paths import file_problems
 from urban_processing.report.legend import (
     draw_colour_bar,
     draw_legend,
@@ -45,7 +46,7 @@ from urban_processing.schema import PARCELS, ColumnType
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from urban_processing.io.frames import GeoLayout
+    from urban_processing.metrics import MeasuredLayout
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """Kinds of files that a map can be written to."""
@@ -70,7 +71,7 @@ class MapFigure(Figure):
 
 
 def plot_layout(
-    layout: GeoLayout | Layout,
+    layout: MeasuredLayout | Layout,
     path: str | PathLike[str] | None = None,
     *,
     ax: Axes | None = None,
@@ -125,14 +126,10 @@ def plot_layout(
 
 def check_map_output(path: str | PathLike[str]) -> list[str]:
     """Return why a map cannot be written to a path; nothing where it can."""
-    from urban_processing.layout_file.files import folder_problems
-
     target = Path(path)
-    problems = folder_problems(target.parent)
+    problems = file_problems(target)
     if target.suffix.lower() not in SUFFIXES:
         problems.append(f"The map {target} must end in one of {', '.join(SUFFIXES)}.")
-    if target.is_dir():
-        problems.append(f"The map {target} is a folder: give the name of a file.")
     return problems
 
 

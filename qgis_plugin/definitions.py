@@ -1,0 +1,213 @@
+"""From an algorithm's declaration to the parameters and outputs that QGIS shows."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from qgis.core import (
+    QgsProcessing,
+    QgsProcessingParameterBoolean,
+    QgsProcessingParameterCrs,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterEnum,
+    QgsProcessingParameterFeatureSink,
+    QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterFile,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterNumber,
+    QgsProcessingParameterString,
+)
+
+from urban_processing.algorithms import AlgorithmSpec, Input, InputKind, Output, OutputKind
+from urban_processing.algorithms.words import limits_in_words
+from urban_processing.params import ParamField
+from urban_processing.schema import LAID_OUT, GeometryType, Layer
+
+CRS = "CRS"
+"""The CRS to work in, as ``--crs`` on the command line."""
+
+_CRS_HELP = (
+    "Projected CRS in metres to work in; the CRS of a layer that has none. By default the layer's "
+    "own if it is metric and true to area, else UTM or a local equal-area projection."
+)
+_SELECTION = " Only the selected features, if the box is ticked."
+_POLYGON = QgsProcessing.SourceType.TypeVectorPolygon
+_SINK_TYPES = {
+    GeometryType.NONE: QgsProcessing.SourceType.TypeVector,
+    GeometryType.POINT: QgsProcessing.SourceType.TypeVectorPoint,
+    GeometryType.LINE: QgsProcessing.SourceType.TypeVectorLine,
+    GeometryType.POLYGON: _POLYGON,
+    GeometryType.ANY: QgsProcessing.SourceType.TypeVectorPoint,
+}
+"""Geometry of the sink of a layer; places stand for areas where a layer has both."""
+
+_FILES = {
+    OutputKind.LAYOUT: "GeoPackage (*.gpkg)",
+    OutputKind.MAP: "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)",
+}
+"""Outputs that are single files. An export, a folder of plain files, is none of QGIS's: each
+sink goes to a file of any format."""
+
+
+@dataclass(frozen=True)
+class SinkName:
+    """A sink: a layer of a layout output."""
+
+    output: Output
+    layer: Layer
+
+    @property
+    def parameter(self) -> str:
+        """Name of the parameter."""
+        return f"{parameter_name(self.output.name)}_{parameter_name(self.layer.name)}"
+
+
+def parameter_name(name: str) -> str:
+    """Return the name in QGIS of what is declared as `name`.
+
+    >>> parameter_name("min_area")
+    'MIN_AREA'
+    """
+    return name.upper()
+
+
+def sinks(spec: AlgorithmSpec) -> Iterator[SinkName]:
+    """Yield the sinks of an algorithm in the order of asking: those made by default first."""
+    for output in spec.outputs:
+        if output.kind is OutputKind.LAYOUT:
+            for layer in sorted(LAID_OUT, key=lambda layer: not layer.shown):
+                yield SinkName(output, layer)
+
+
+def files(spec: AlgorithmSpec) -> Iterator[Output]:
+    """Yield the outputs that are single files."""
+    return (output for output in spec.outputs if output.kind in _FILES)
+
+
+def input_of(spec: AlgorithmSpec, kind: InputKind) -> Input | None:
+    """Return the input of a kind of which an algorithm has one at most."""
+    return next((item for item in spec.inputs if item.kind is kind), None)
+
+
+def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinition]:
+    """Yield everything that is asked for: inputs, parameters, sinks, files."""
+    for item in spec.inputs:
+        yield _helped(_INPUTS[item.kind](item), item.help + _INPUT_NOTES.get(item.kind, ""))
+    fields = [field for panel in spec.panels().values() for field in panel]
+    for field in fields:
+        if not field.param.advanced:
+            yield _parameter(field)
+    if input_of(spec, InputKind.BOUNDARY):
+        crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)
+        yield _helped(crs, _CRS_HELP)
+    for field in fields:
+        if field.param.advanced:
+            definition = _parameter(field)
+            flag = QgsProcessingParameterDefinition.Flag.FlagAdvanced
+            definition.setFlags(definition.flags() | flag)
+            yield definition
+    for sink in sinks(spec):
+        yield _sink(sink)
+    for output in files(spec):
+        definition = QgsProcessingParameterFileDestination(
+            parameter_name(output.name),
+            output.label,
+            fileFilter=_FILES[output.kind],
+            optional=True,
+            createByDefault=False,
+        )
+        yield _helped(definition, output.help)
+
+
+def _polygons(item: Input) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterFeatureSource(
+        parameter_name(item.name), item.label, [_POLYGON], optional=not item.required
+    )
+
+
+def _points(item: Input) -> QgsProcessingParameterDefinition:
+    point = QgsProcessing.SourceType.TypeVectorPoint
+    return QgsProcessingParameterFeatureSource(
+        parameter_name(item.name), item.label, [point], optional=not item.required
+    )
+
+
+def _layout_file(item: Input) -> QgsProcessingParameterDefinition:
+    return QgsProcessingParameterFile(
+        parameter_name(item.name),
+        item.label,
+        QgsProcessingParameterFile.Behavior.File,
+        fileFilter=_FILES[OutputKind.LAYOUT],
+        optional=not item.required,
+    )
+
+
+_INPUTS: dict[InputKind, Callable[[Input], QgsProcessingParameterDefinition]] = {
+    InputKind.BOUNDARY: _polygons,
+    InputKind.CORNER_POINTS: _points,
+    InputKind.LAYOUT: _layout_file,
+}
+_INPUT_NOTES = {InputKind.BOUNDARY: _SELECTION, InputKind.CORNER_POINTS: _SELECTION}
+
+
+def _parameter(field: ParamField) -> QgsProcessingParameterDefinition:
+    """Return the definition of a parameter, with its unit in the label."""
+    param, name = field.param, parameter_name(field.name)
+    label = f"{param.label} [{param.unit}]" if param.unit else param.label
+    shared: dict[str, Any] = {"optional": field.optional}
+    definition: QgsProcessingParameterDefinition
+    if issubclass(field.kind, enum.Enum):
+        values = list(field.kind)
+        definition = QgsProcessingParameterEnum(
+            name,
+            label,
+            options=[param.labels.get(member.value, member.value) for member in values],
+            defaultValue=None if field.default is None else values.index(field.default),
+            **shared,
+        )
+    elif field.kind is bool:
+        definition = QgsProcessingParameterBoolean(name, label, field.default, **shared)
+    elif field.kind is str:
+        definition = QgsProcessingParameterString(name, label, field.default, **shared)
+    else:
+        definition = _number(field, name, label)
+    limits = limits_in_words(field)
+    return _helped(definition, f"{param.help} ({limits})" if limits else param.help)
+
+
+def _number(field: ParamField, name: str, label: str) -> QgsProcessingParameterNumber:
+    param, kinds = field.param, QgsProcessingParameterNumber.Type
+    least = param.minimum if param.above is None else param.above
+    # QGIS knows no open limits: what is `above` is checked with everything else
+    limits = {"minValue": least, "maxValue": param.maximum}
+    return QgsProcessingParameterNumber(
+        name,
+        label,
+        kinds.Integer if field.kind is int else kinds.Double,
+        defaultValue=field.default,
+        optional=field.optional,
+        **{key: value for key, value in limits.items() if value is not None},
+    )
+
+
+def _sink(sink: SinkName) -> QgsProcessingParameterFeatureSink:
+    layer = sink.layer
+    definition = QgsProcessingParameterFeatureSink(
+        sink.parameter,
+        layer.title,
+        _SINK_TYPES[layer.geometry],
+        optional=True,
+        createByDefault=layer.shown,
+    )
+    columns = ", ".join(column.name for column in layer.columns)
+    return _helped(definition, f"Layer with the columns {columns}.")
+
+
+def _helped(
+    definition: QgsProcessingParameterDefinition, text: str
+) -> QgsProcessingParameterDefinition:
+    definition.setHelp(text)
+    return definition

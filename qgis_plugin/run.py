@@ -1,0 +1,120 @@
+"""One run of an algorithm in QGIS; the engine is imported here, not before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qgis.core import QgsProcessingFeedback
+
+from qgis_plugin.crs import crs_of
+from qgis_plugin.destinations import Destinations
+from qgis_plugin.feedback import in_qgis, stop_if_cancelled
+from qgis_plugin.geopackage import OGR
+from qgis_plugin.results import write_sink
+from qgis_plugin.sources import Sources
+from qgis_plugin.styling import ResultGroup
+from urban_processing.algorithms import AlgorithmSpec, InputKind, Output, OutputKind
+from urban_processing.algorithms.words import estimate_in_words
+from urban_processing.layout_file.files import as_written, write_layout
+from urban_processing.metrics import MeasuredLayout
+from urban_processing.params import Params
+from urban_processing.progress import MANY_PARCELS, Progress
+
+if TYPE_CHECKING:
+    from qgis_plugin.algorithm import SpecAlgorithm
+
+_COMPUTING = 0.9
+"""Share of the progress bar for the engine; measuring and writing take the rest."""
+
+
+def run(
+    algorithm: SpecAlgorithm,
+    params: Params,
+    destinations: Destinations,
+    progress: Progress,
+    feedback: QgsProcessingFeedback,
+) -> dict[str, Any]:
+    """Read the inputs, run the engine, write files and sinks, and say what was made.
+
+    Nothing is written before everything has been worked out, so that a run that is cancelled
+    leaves nothing.
+
+    Returns
+    -------
+    dict
+        Ids of layers and paths of files by parameter, as QGIS wants them.
+    """
+    spec = algorithm.spec
+    sources = Sources(algorithm, destinations.parameters, destinations.context, feedback)
+    inputs = sources.read()
+    _say_what_inputs_say(spec, inputs, feedback)
+    if spec.estimate is not None:
+        estimate = spec.estimate(inputs, params)
+        say = feedback.pushWarning if estimate.parcels > MANY_PARCELS else feedback.pushInfo
+        say(f"Expected: {estimate_in_words(estimate)}.")
+    made = spec.run(inputs, params, progress.slice(0.0, _COMPUTING))
+    layouts = {
+        output.name: MeasuredLayout(as_written(made[output.name]))
+        for output in spec.outputs
+        if output.kind is OutputKind.LAYOUT
+    }
+    progress.update(_COMPUTING, "Measuring the layout")
+    broken = [check for layout in layouts.values() for check in layout.certificate.failures]
+    progress.update(0.95, "Writing the results")
+    results: dict[str, Any] = {}
+    for name, (output, path) in destinations.files.items():
+        _write_file(output, layouts, path)
+        results[name] = str(path)
+    stop_if_cancelled(feedback)
+    group = ResultGroup(_title(sources.name, spec, params))
+    for sink in destinations.sinks:
+        layout = layouts[sink.output.name]
+        results[sink.parameter] = write_sink(
+            sink,
+            layout.tables.get(sink.layer.name),
+            destinations,
+            crs=layout.layout.frame.crs,
+            group=group,
+        )
+    for layout in layouts.values():
+        for name, value in layout.summary():
+            feedback.pushInfo(f"{name}: {value}")
+    if broken:
+        feedback.reportError(
+            "The layout was made, but not all that it promises holds:\n"
+            + "\n".join(check.message for check in broken)
+        )
+    return results
+
+
+def _say_what_inputs_say(
+    spec: AlgorithmSpec, inputs: Mapping[str, Any], feedback: QgsProcessingFeedback
+) -> None:
+    """Say which CRS is worked in, and what was repaired or changed in reading a boundary."""
+    for item in spec.inputs:
+        if item.kind is InputKind.BOUNDARY and inputs[item.name] is not None:
+            site = inputs[item.name]
+            for issue in site.issues:
+                feedback.pushInfo(in_qgis(issue.message))
+            crs = crs_of(site.frame.crs)
+            feedback.pushInfo(f"CRS of the results: {crs.userFriendlyIdentifier()}.")
+
+
+def _write_file(output: Output, layouts: Mapping[str, MeasuredLayout], path: Path) -> None:
+    layout = layouts[output.of or output.name]
+    if output.kind is OutputKind.LAYOUT:
+        write_layout(layout.layout, path, library=OGR, overwrite=True, tables=layout.tables)
+    else:
+        from urban_processing.report.map import plot_layout
+
+        plot_layout(layout, path)
+
+
+def _title(land: str, spec: AlgorithmSpec, params: Params) -> str:
+    """Return the name of the group of results: land, algorithm and seed."""
+    seed = getattr(params, "seed", None)
+    return ", ".join(
+        [*filter(None, [land, spec.name]), *([] if seed is None else [f"seed {seed}"])]
+    )

@@ -1,0 +1,135 @@
+"""Layers of QGIS to what the engine reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from qgis.core import (
+    QgsCoordinateReferenceSystem,
+    QgsFeatureRequest,
+    QgsFeatureSource,
+    QgsGeometry,
+    QgsProcessingContext,
+    QgsProcessingException,
+    QgsProcessingFeedback,
+    QgsWkbTypes,
+)
+
+from qgis_plugin.crs import QgisCrs
+from qgis_plugin.definitions import CRS, input_of, parameter_name
+from qgis_plugin.feedback import stop_if_cancelled
+from qgis_plugin.geopackage import OGR
+from urban_processing.algorithms import Input, InputKind
+from urban_processing.errors import BoundaryError
+from urban_processing.intake.features import Features
+from urban_processing.intake.sites import build_site
+from urban_processing.layout_file.files import read_layout
+from urban_processing.site import Site
+
+if TYPE_CHECKING:
+    from qgis_plugin.algorithm import SpecAlgorithm
+
+
+class Sources:
+    """The inputs of one run.
+
+    Parameters
+    ----------
+    algorithm, parameters, context, feedback
+        As QGIS gives them.
+    """
+
+    def __init__(
+        self,
+        algorithm: SpecAlgorithm,
+        parameters: Mapping[str, Any],
+        context: QgsProcessingContext,
+        feedback: QgsProcessingFeedback,
+    ) -> None:
+        self.algorithm = algorithm
+        self.parameters = dict(parameters)
+        self.context = context
+        self.feedback = feedback
+        self.name = ""
+        """What the first input is called, to name results after."""
+
+    def read(self) -> dict[str, Any]:
+        """Return the inputs as the engine takes them, by name.
+
+        Raises
+        ------
+        UrbanError
+            With everything that is wrong with them.
+        """
+        inputs: dict[str, Any] = {}
+        for item in self.algorithm.spec.inputs:
+            if item.kind is InputKind.BOUNDARY:
+                inputs[item.name] = self._site(item)
+            elif item.kind is InputKind.LAYOUT:
+                inputs[item.name] = self._layout(item)
+        return inputs
+
+    def _site(self, item: Input) -> Site | None:
+        features = self._features(item)
+        if features is None:
+            return None
+        self.name = self.name or features.name
+        corners = input_of(self.algorithm.spec, InputKind.CORNER_POINTS)
+        asked = self.algorithm.parameterAsCrs(self.parameters, CRS, self.context)
+        return build_site(
+            features,
+            library=QgisCrs(self.context.transformContext()),
+            asked=asked if asked.isValid() else None,
+            corners=None if corners is None else self._features(corners),
+        )
+
+    def _layout(self, item: Input) -> Any:
+        path = self.algorithm.parameterAsFile(
+            self.parameters, parameter_name(item.name), self.context
+        )
+        if not path:
+            return None
+        self.name = self.name or Path(path).stem
+        return read_layout(path, library=OGR)
+
+    def _features(self, item: Input) -> Features[QgsCoordinateReferenceSystem] | None:
+        """Read a layer, or the features of it that are selected; None where none is given."""
+        name = parameter_name(item.name)
+        source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
+        if source is None:
+            if item.required or self.parameters.get(name) not in (None, ""):
+                raise QgsProcessingException(
+                    self.algorithm.invalidSourceError(self.parameters, name)
+                )
+            return None
+        return Features(
+            np.array([*self._geometries(source), None], dtype=object)[:-1],
+            source.sourceCrs() if source.sourceCrs().isValid() else None,
+            source.sourceName(),
+        )
+
+    def _geometries(self, source: QgsFeatureSource) -> list[shapely.Geometry | None]:
+        request = QgsFeatureRequest().setNoAttributes()
+        found = []
+        for feature in source.getFeatures(request):
+            stop_if_cancelled(self.feedback)
+            found.append(_shapely(feature.geometry()))
+        return found
+
+
+def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:
+    if geometry.isNull():
+        return None
+    if QgsWkbTypes.isCurvedType(geometry.wkbType()):
+        geometry.convertToStraightSegment()
+    try:
+        return shapely.from_wkb(bytes(geometry.asWkb()))
+    except shapely.errors.GEOSException as error:
+        kind = QgsWkbTypes.displayString(geometry.wkbType())
+        raise BoundaryError(
+            f"A geometry of the kind {kind} cannot be read ({error}): turn it into a polygon."
+        ) from error

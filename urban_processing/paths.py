@@ -1,0 +1,46 @@
+"""Whether files can be written where they are to go, asked before a long run."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+GEOPACKAGE = ".gpkg"
+_SIDE_FILES = ("-journal", "-wal")
+
+
+def folder_problems(folder: Path) -> list[str]:
+    """Return why nothing can be written into a folder; nothing where it can."""
+    if not folder.exists():
+        return [f"The folder {folder} does not exist: create it first."]
+    if not folder.is_dir():
+        return [f"{folder} is not a folder."]
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return [f"The folder {folder} is not writable: choose another, or change its rights."]
+    return []
+
+
+def file_problems(target: Path) -> list[str]:
+    """Return why a file cannot be written or replaced; nothing where it can."""
+    problems = folder_problems(target.parent)
+    if target.is_dir():
+        problems.append(f"The output {target} is a folder: give the name of a file.")
+    elif target.exists() and not os.access(target, os.W_OK):
+        problems.append(f"The output {target} is write-protected: choose another name.")
+    return problems
+
+
+def geopackage_problems(target: Path) -> list[str]:
+    """Return why a GeoPackage cannot be written or replaced as a whole."""
+    problems = []
+    if target.suffix.lower() != GEOPACKAGE:
+        problems.append(f"The output {target} must be a GeoPackage: end its name in {GEOPACKAGE}.")
+    problems += file_problems(target)
+    beside = [target.with_name(target.name + end) for end in _SIDE_FILES]
+    if any(file.exists() for file in beside):
+        named = " and ".join(file.name for file in beside if file.exists())
+        problems.append(
+            f"The output {target} is open in another program ({named} lies beside it): close it "
+            "there, or choose another name."
+        )
+    return problems
