@@ -141,4 +141,4 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
 
 def tr(text: str) -> str:
     """Return a text in the language of the user."""
-    return QCoreApplication.translate(CONTEXT, text)
+    return str(QCoreApplication.translate(CONTEXT, text))

@@ -72,9 +72,9 @@ def contents() -> Iterator[tuple[str, str]]:
             yield name, vendored(path.read_text(encoding="utf-8"))
     yield "LICENSE", (ROOT / GPL).read_text(encoding="utf-8")
     for path in _sources(ROOT / "urban_processing"):
-        name = path.relative_to(ROOT / "urban_processing")
-        if name.parts[0] not in EDGES:
-            yield f"engine/{name.as_posix()}", vendored(path.read_text(encoding="utf-8"))
+        place = path.relative_to(ROOT / "urban_processing")
+        if place.parts[0] not in EDGES:
+            yield f"engine/{place.as_posix()}", vendored(path.read_text(encoding="utf-8"))
     yield "engine/__init__.py", f'"""The engine of urban_processing {version()}."""\n'
     yield "engine/LICENSE", (ROOT / "LICENSE").read_text(encoding="utf-8")
 

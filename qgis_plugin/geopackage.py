@@ -16,7 +16,7 @@ from urban_processing.layout_file.geopackage import (
     FIXED_DATE,
     GEOMETRY_COLUMN,
     VERSION,
-    field_arrays,
+    field_values,
 )
 from urban_processing.metrics.tables import Table
 from urban_processing.schema import ColumnType, GeometryType, Layer
@@ -96,20 +96,16 @@ def _write_layer(file: Any, layer: Layer, table: Table, system: Any) -> None:
         if column.dtype is ColumnType.BOOLEAN:
             definition.SetSubType(ogr.OFSTBoolean)
         _succeeded(made.CreateField(definition))
-    _, values, masks = field_arrays(layer, table)
-    columns = [
-        value.tolist() if mask is None else np.where(mask, None, value).tolist()
-        for value, mask in zip(values, masks, strict=True)
-    ]
-    geometries = [None] * len(table)
+    columns = field_values(layer, table)
+    geometries: list[bytes | None] = [None] * len(table)
     if kind != ogr.wkbNone and table.geometry is not None:
         geometries = shapely.to_wkb(table.geometry).tolist()
     file.StartTransaction()
     for row, wkb in enumerate(geometries):
         feature = ogr.Feature(made.GetLayerDefn())
-        for i, column in enumerate(columns):
-            if column[row] is not None:
-                feature.SetField(i, column[row])
+        for i, values in enumerate(columns):
+            if values[row] is not None:
+                feature.SetField(i, values[row])
         if wkb is not None:
             feature.SetGeometryDirectly(ogr.CreateGeometryFromWkb(wkb))
         _succeeded(made.CreateFeature(feature))

@@ -21,7 +21,7 @@ from qgis_plugin.crs import crs_of
 from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.styling import ResultGroup
-from urban_processing.layout_file.geopackage import field_arrays
+from urban_processing.layout_file.geopackage import field_values
 from urban_processing.metrics.tables import Table
 from urban_processing.schema import GeometryType, Layer
 
@@ -104,14 +104,9 @@ def _features(
     *,
     several: bool,
 ) -> list[QgsFeature]:
-    _, values, masks = field_arrays(layer, table)
-    columns = [
-        value.tolist() if mask is None else np.where(mask, None, value).tolist()
-        for value, mask in zip(values, masks, strict=True)
-    ]
     wkb = [None] * len(table) if geometry is None else shapely.to_wkb(geometry).tolist()
     out = []
-    for row, shape in zip(zip(*columns, strict=True), wkb, strict=True):
+    for row, shape in zip(zip(*field_values(layer, table), strict=True), wkb, strict=True):
         feature = QgsFeature(fields)
         feature.setAttributes(list(row))
         if shape is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from processing.core.ProcessingConfig import ProcessingConfig
 from qgis.core import (
     QgsLayerTreeGroup,
     QgsProcessingContext,
@@ -15,7 +16,7 @@ from qgis.core import (
 from qgis.PyQt.QtXml import QDomDocument
 
 from urban_processing.layout_file.styles import layer_style
-from urban_processing.schema import ISSUES, JUNCTIONS, PARCELS, STREETS, Layer
+from urban_processing.schema import ISSUES, JUNCTIONS, LAYERS, PARCELS, STREETS, Layer
 
 if TYPE_CHECKING:
     from qgis_plugin.provider import UrbanProcessingProvider
@@ -36,7 +37,7 @@ class ResultGroup:
     def __init__(self, title: str) -> None:
         self.title = title
         self.group: QgsLayerTreeGroup | None = None
-        self.placed: list[tuple[int, str]] = []
+        self.ranks: dict[str, int] = {}
 
     def will_load(
         self,
@@ -57,13 +58,19 @@ class ResultGroup:
         node = project.layerTreeRoot().findLayer(loaded.id())
         if node is None:
             return
-        parent = node.parent()
         if self.group is None:
-            self.group = parent.insertGroup(0, self.title)
-        rank = (_rank(layer), loaded.id())
-        self.placed = sorted([*self.placed, rank])
-        self.group.insertChildNode(self.placed.index(rank), node.clone())
-        parent.removeChildNode(node)
+            self.group = _results(project).insertGroup(0, self.title)
+        self.ranks[loaded.id()] = _rank(layer)
+        above = [
+            child
+            for child in self.group.findLayers()
+            if self.ranks.get(child.layerId(), len(LAYERS)) <= _rank(layer) and child != node
+        ]
+        children = self.group.children()
+        place = 1 + children.index(above[-1]) if above else 0
+        # a layer that leaves the tree for a moment would leave the project: in first, then out
+        self.group.insertChildNode(place, node.clone())
+        node.parent().removeChildNode(node)
 
 
 class ResultStyle(QgsProcessingLayerPostProcessorInterface):
@@ -92,13 +99,20 @@ class ResultStyle(QgsProcessingLayerPostProcessorInterface):
 
 def apply_style(layer: Layer, loaded: QgsVectorLayer) -> None:
     """Give a layer the style that the layout file has for it."""
-    qml = layer_style(layer.name, aliases={column.name: column.label for column in layer.columns})
+    qml = layer_style(layer, places_only=True)
     if qml is None:
         return
     document = QDomDocument()
     document.setContent(qml)
     loaded.importNamedStyle(document)
     loaded.triggerRepaint()
+
+
+def _results(project: QgsProject) -> QgsLayerTreeGroup:
+    """Where results go: the group that the user's settings name, else the top."""
+    root = project.layerTreeRoot()
+    name = ProcessingConfig.getSetting(ProcessingConfig.RESULTS_GROUP_NAME)
+    return (root.findGroup(name) if name else None) or root
 
 
 def _rank(layer: Layer) -> int:

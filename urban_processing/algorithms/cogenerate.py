@@ -50,7 +50,7 @@ COGENERATE = AlgorithmSpec(
             name="boundary",
             kind=InputKind.BOUNDARY,
             label="Land",
-            help="The land: a file with polygons, of any vector format.",
+            help="The land: polygons, in a vector layer or file of any format.",
         ),
         Input(
             name="corners",

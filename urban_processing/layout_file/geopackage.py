@@ -132,6 +132,16 @@ def field_arrays(
     return names, values, masks
 
 
+def field_values(layer: Layer, table: Table) -> list[list[Any]]:
+    """Return the columns of a table as lists of plain Python values, None where one is missing."""
+    _, values, masks = field_arrays(layer, table)
+    columns = [value.tolist() for value in values]
+    for column, mask in zip(columns, masks, strict=True):
+        for row in [] if mask is None else np.flatnonzero(mask).tolist():
+            column[row] = None
+    return columns
+
+
 def read_state(path: Path) -> str | None:
     """Return the state of a file that `write_geopackage` wrote, None for any other file."""
     try:
@@ -180,7 +190,7 @@ def _write_styles(connection: sqlite3.Connection, layers: list[Layer]) -> None:
         (FIXED_DATE,),
     )
     for layer in layers:
-        qml = layer_style(layer.name, aliases={c.name: c.label for c in layer.columns})
+        qml = layer_style(layer)
         if qml is not None:
             connection.execute(
                 "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name,"

@@ -6,6 +6,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from urban_processing.schema import GeometryType, Layer
+
 QML_VERSION = "3.22.0"
 _METRES, _MILLIMETRES = "RenderMetersInMapUnits", "MM"
 
@@ -14,6 +16,14 @@ _OUTLINE = "140,134,124,255"
 _TRIANGLE = "182,160,214,230"
 _REDS = ("247,200,186,230", "238,140,116,230", "214,69,56,235")
 _STREET, _CASING = "255,204,70,255", "133,102,26,255"
+_STREETS = {
+    "rim": ("Rim street", "240,158,56,255"),
+    "fixed": ("Fixed street", "150,178,200,255"),
+    "collector": ("Collector", _STREET),
+    "local": ("Local street", "255,232,160,255"),
+    "cul_de_sac": ("Cul-de-sac", "255,253,246,255"),
+}
+"""Label and fill of each class of streets: the more a street carries, the stronger."""
 _DARK, _ALERT = "70,66,58,255", "200,30,40,255"
 
 
@@ -27,24 +37,27 @@ class _Rule:
     symbol: str
 
 
-def layer_style(name: str, *, aliases: Mapping[str, str]) -> str | None:
+def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     """Return the QML of a layer, None for layers that have no style.
 
     Parameters
     ----------
-    name
-        Name of the layer, as in the schema.
-    aliases
-        Readable name of each column.
+    layer
+        The layer.
+    places_only
+        Whether a layer of places and areas has nothing but places, where it is shown.
     """
-    rules = _RULES.get(name)
-    if rules is None:
+    name = layer.name
+    if name not in _RULES:
         return None
+    rules = _RULES[name]()
+    if places_only and layer.geometry is GeometryType.ANY:
+        rules = [rule for rule in rules if rule.symbol == "marker"]
     root = ET.Element(
         "qgis", version=QML_VERSION, styleCategories="Symbology|Fields|Rendering|MapTips"
     )
-    root.append(_renderer(rules(), symbol_levels=name == "streets"))
-    _add_aliases(root, aliases)
+    root.append(_renderer(rules, symbol_levels=name == "streets"))
+    _add_aliases(root, {column.name: column.label for column in layer.columns})
     ET.indent(root, " ")
     return ET.tostring(root, encoding="unicode")
 
@@ -141,9 +154,9 @@ def _line(color: str, *, factor: float, at_least: float, level: int) -> ET.Eleme
     )
 
 
-def _street(factor: float) -> list[ET.Element]:
+def _street(color: str, factor: float) -> list[ET.Element]:
     casing = _line(_CASING, factor=1.4 * factor, at_least=0.85, level=0)
-    return [casing, _line(_STREET, factor=factor, at_least=0.5, level=1)]
+    return [casing, _line(color, factor=factor, at_least=0.5, level=1)]
 
 
 def _marker(
@@ -159,7 +172,7 @@ def _marker(
             "outline_width_unit": _MILLIMETRES,
             "size": str(metres),
             "size_unit": _METRES,
-            "size_map_unit_scale": f"3x:0,0,1,{at_least},0,0",
+            "size_map_unit_scale": f"3x:0,0,1,{at_least},1,6",
         },
     )
 
@@ -186,16 +199,9 @@ def _parcels() -> list[_Rule]:
 
 
 def _streets() -> list[_Rule]:
-    labels = {
-        "rim": "Rim street",
-        "fixed": "Fixed street",
-        "collector": "Collector",
-        "local": "Local street",
-        "cul_de_sac": "Cul-de-sac",
-    }
     return [
-        _Rule(label, f"\"class\" = '{name}'", _street(0.6), "line")
-        for name, label in labels.items()
+        _Rule(label, f"\"class\" = '{name}'", _street(color, 0.6), "line")
+        for name, (label, color) in _STREETS.items()
     ]
 
 

@@ -36,6 +36,9 @@ FLOOR_SHARE = 0.6
 MOST_PARCELS = 2_000_000
 """More parcels than this are refused: the run would take hours and all the memory."""
 
+LEVELS_SHARE, RECUT_SHARE = 0.65, 0.8
+"""Share of the levels in the time of a run, and of cutting again in the time after them."""
+
 SECONDS_PER_PARCEL = 1.8e-3
 """For the estimate that is given before a long run; one core of a common machine."""
 
@@ -103,7 +106,7 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
     params
         Smallest area or number of parcels, street pattern, weights.
     progress
-        Told of every level; may cancel between levels.
+        Told of every level and of what comes after them; may cancel between these steps.
 
     Returns
     -------
@@ -118,12 +121,14 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
             "one run. Give a larger smallest area, fewer parcels, or lay out districts apart."
         )
     state = begin(site, params)
+    levels = progress.slice(0.0, LEVELS_SHARE)
     while not state.finished:
         done = math.log2(state.layout.mesh.n_faces + 1) / math.log2(goal + 2)
-        progress.update(min(done, 1.0) ** 3, _message(state))
+        levels.update(min(done, 1.0) ** 3, _message(state))
         state = step(state)
-    layout = canonical(finish(state))
-    progress.update(1.0, _message(state))
+    levels.update(1.0, _message(state))
+    layout = canonical(finish(state, progress.slice(LEVELS_SHARE, 1.0)))
+    progress.update(1.0)
     entry = Step(
         algorithm="cogenerate",
         parameters=params.as_dict(),
@@ -226,12 +231,18 @@ def _levels_left(state: State) -> int:
     return max(1, math.ceil(math.log2(largest / (MEAN_OVER_MIN * state.min_area))))
 
 
-def finish(state: State) -> Layout:
-    """Clean up the streets and list what the user should know."""
+def finish(state: State, progress: Progress = SILENT) -> Layout:
+    """Cut irregular parcels again, clean up the streets, list what the user should know."""
     params = state.params
     layout = state.layout
     if params.rules.recut:
-        layout = recut_irregular(layout, min_area=state.min_area, params=params)
+        layout = recut_irregular(
+            layout,
+            min_area=state.min_area,
+            params=params,
+            progress=progress.slice(0.0, RECUT_SHARE),
+        )
+    progress.update(RECUT_SHARE, "Cleaning up the streets")
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
     min_area = state.min_area
     if state.quota is not None:

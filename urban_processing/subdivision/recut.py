@@ -18,6 +18,7 @@ from urban_processing.mesh.corners import polygon_irregularity, reported_polygon
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.progress import SILENT, Progress
 from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.streamline import propose_cuts
@@ -47,17 +48,24 @@ class _Pair:
     chain: tuple[int, ...]
 
 
-def recut_irregular(layout: Layout, *, min_area: float, params: CogenerateParams) -> Layout:
+def recut_irregular(
+    layout: Layout,
+    *,
+    min_area: float,
+    params: CogenerateParams,
+    progress: Progress = SILENT,
+) -> Layout:
     """Join irregular parcels with a neighbour each and cut the two anew where that is better.
 
     The parcels on both sides of a street are never joined, and both new parcels must be
     reached by the streets that there are. The number of parcels stays the same.
     """
     tried: set[frozenset[int]] = set()
-    for _ in range(ROUNDS):
+    for i in range(ROUNDS):
         pairs = _choose_pairs(layout, tried)
         if not pairs:
             break
+        progress.update(i / ROUNDS, f"Cutting {len(pairs)} irregular parcels again")
         layout = _recut(layout, pairs, min_area, params)
     return layout
 
