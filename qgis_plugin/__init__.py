@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from qgis_plugin.plugin import UrbanProcessingPlugin
 
 
-def classFactory(iface: Any) -> UrbanProcessingPlugin:  # noqa: N802
+def classFactory(iface: Any) -> UrbanProcessingPlugin:
     """Return the plugin; QGIS calls this."""
     from qgis_plugin.plugin import UrbanProcessingPlugin
 

@@ -40,7 +40,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         super().__init__()
         self.spec = spec
 
-    def createInstance(self) -> SpecAlgorithm:  # noqa: N802
+    def createInstance(self) -> SpecAlgorithm:
         """Return a new algorithm of the same kind."""
         return SpecAlgorithm(self.spec)
 
@@ -48,7 +48,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         """Return the stable identifier."""
         return self.spec.name
 
-    def displayName(self) -> str:  # noqa: N802
+    def displayName(self) -> str:
         """Return the title."""
         return tr(self.spec.title)
 
@@ -56,7 +56,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         """Return the group in the toolbox."""
         return tr(self.spec.group)
 
-    def groupId(self) -> str:  # noqa: N802
+    def groupId(self) -> str:
         """Return the stable identifier of the group."""
         return self.spec.group.lower().replace(" ", "_")
 
@@ -69,25 +69,25 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         """Return the picture beside the title."""
         return self.provider().icon() if self.provider() else super().icon()
 
-    def shortDescription(self) -> str:  # noqa: N802
+    def shortDescription(self) -> str:
         """Return one sentence."""
         return tr(self.spec.summary)
 
-    def shortHelpString(self) -> str:  # noqa: N802
+    def shortHelpString(self) -> str:
         """Return the text beside the dialog: what the algorithm does, and its sources."""
         paragraphs = [self.spec.summary, *self.spec.description.split("\n\n")]
         text = "".join(f"<p>{escape(tr(paragraph))}</p>" for paragraph in paragraphs)
         sources = "".join(f"<li>{escape(source)}</li>" for source in self.spec.references)
         return text + (f"<p><b>{tr('Sources')}</b></p><ul>{sources}</ul>" if sources else "")
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
         """Declare parameters and outputs."""
         del configuration
         for definition in definitions(self.spec):
             definition.setDescription(tr(definition.description()))
             self.addParameter(definition)
 
-    def checkParameterValues(  # noqa: N802
+    def checkParameterValues(
         self, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> tuple[bool, str]:
         """Say all that is wrong with the values, before anything runs."""
@@ -98,7 +98,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         problems += Destinations(self, parameters, context).problems()
         return not problems, "\n".join(problems)
 
-    def processAlgorithm(  # noqa: N802
+    def processAlgorithm(
         self,
         parameters: dict[str, Any],
         context: QgsProcessingContext,
@@ -131,7 +131,10 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
             return self.parameterAsBoolean(parameters, name, context)
         if field.kind is str:
             return self.parameterAsString(parameters, name, context)
-        return self.parameterAsDouble(parameters, name, context)
+        if isinstance(parameters[name], str):
+            return parameters[name]  # QGIS would take what is no number for the default
+        number = self.parameterAsDouble(parameters, name, context)
+        return int(number) if field.kind is int and number.is_integer() else number
 
     def _label(self, name: str) -> str:
         """Return what a parameter is called in the dialog."""

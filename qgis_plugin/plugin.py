@@ -21,7 +21,7 @@ class UrbanProcessingPlugin:
         self.iface = iface
         self.provider: UrbanProcessingProvider | None = None
 
-    def initProcessing(self) -> None:  # noqa: N802
+    def initProcessing(self) -> None:
         """Offer the algorithms; all that there is to do without a window."""
         if sys.version_info < OLDEST_PYTHON:
             self._say(
@@ -36,7 +36,7 @@ class UrbanProcessingPlugin:
         self.provider = UrbanProcessingProvider()
         QgsApplication.processingRegistry().addProvider(self.provider)
 
-    def initGui(self) -> None:  # noqa: N802
+    def initGui(self) -> None:
         """Offer the algorithms in a QGIS with a window."""
         self.initProcessing()
 

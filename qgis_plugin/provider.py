@@ -43,11 +43,11 @@ class UrbanProcessingProvider(QgsProcessingProvider):
         """Return what the toolbox shows."""
         return TITLE
 
-    def longName(self) -> str:  # noqa: N802
+    def longName(self) -> str:
         """Return the name with the version."""
         return f"{TITLE} {__version__}"
 
-    def versionInfo(self) -> str:  # noqa: N802
+    def versionInfo(self) -> str:
         """Return the version."""
         return __version__
 
@@ -55,7 +55,7 @@ class UrbanProcessingProvider(QgsProcessingProvider):
         """Return the picture beside the name."""
         return QIcon(str(ICON))
 
-    def loadAlgorithms(self) -> None:  # noqa: N802
+    def loadAlgorithms(self) -> None:
         """Add every algorithm."""
         for spec in self.algorithm_specs:
             self.addAlgorithm(SpecAlgorithm(spec))

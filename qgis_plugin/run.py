@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,7 +69,10 @@ def run(
         _write_file(output, layouts, path)
         results[name] = str(path)
     stop_if_cancelled(feedback)
-    group = ResultGroup(_title(sources.name, spec, params))
+    groups = {
+        name: ResultGroup(_title(sources.name, spec, params), _history(layout))
+        for name, layout in layouts.items()
+    }
     for sink in destinations.sinks:
         layout = layouts[sink.output.name]
         results[sink.parameter] = write_sink(
@@ -76,7 +80,7 @@ def run(
             layout.tables.get(sink.layer.name),
             destinations,
             crs=layout.layout.frame.crs,
-            group=group,
+            group=groups[sink.output.name],
         )
     for layout in layouts.values():
         for name, value in layout.summary():
@@ -118,3 +122,11 @@ def _title(land: str, spec: AlgorithmSpec, params: Params) -> str:
     return ", ".join(
         [*filter(None, [land, spec.name]), *([] if seed is None else [f"seed {seed}"])]
     )
+
+
+def _history(layout: MeasuredLayout) -> list[str]:
+    return [
+        f"{step.algorithm} {step.version}, seed {step.seed}, input {step.input_sha256}, "
+        f"parameters {json.dumps(dict(step.parameters), ensure_ascii=False)}"
+        for step in layout.layout.history
+    ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from processing.core.ProcessingConfig import ProcessingConfig
@@ -32,10 +33,13 @@ class ResultGroup:
     ----------
     title
         Name of the group.
+    history
+        How the layers came about, one sentence for each step.
     """
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, history: Sequence[str] = ()) -> None:
         self.title = title
+        self.history = tuple(history)
         self.group: QgsLayerTreeGroup | None = None
         self.ranks: dict[str, int] = {}
 
@@ -82,7 +86,7 @@ class ResultStyle(QgsProcessingLayerPostProcessorInterface):
         self.group = group
         self.provider = provider
 
-    def postProcessLayer(  # noqa: N802
+    def postProcessLayer(
         self,
         loaded: QgsVectorLayer,
         context: QgsProcessingContext,
@@ -91,6 +95,7 @@ class ResultStyle(QgsProcessingLayerPostProcessorInterface):
         """Style and place a layer, once it is in the project."""
         del feedback
         apply_style(self.layer, loaded)
+        describe(self.layer, loaded, self.group.history)
         project = context.project()
         if project is not None:
             self.group.place(self.layer, loaded, project)
@@ -98,7 +103,10 @@ class ResultStyle(QgsProcessingLayerPostProcessorInterface):
 
 
 def apply_style(layer: Layer, loaded: QgsVectorLayer) -> None:
-    """Give a layer the style that the layout file has for it."""
+    """Give a layer readable names of columns, and the style that the layout file has for it."""
+    for column in layer.columns:
+        # not every format keeps the names that the sink was given
+        loaded.setFieldAlias(loaded.fields().lookupField(column.name), column.label)
     qml = layer_style(layer, places_only=True)
     if qml is None:
         return
@@ -106,6 +114,16 @@ def apply_style(layer: Layer, loaded: QgsVectorLayer) -> None:
     document.setContent(qml)
     loaded.importNamedStyle(document)
     loaded.triggerRepaint()
+
+
+def describe(layer: Layer, loaded: QgsVectorLayer, history: Sequence[str]) -> None:
+    """Have a layer's properties say what its columns mean and how it was made."""
+    metadata = loaded.metadata()
+    metadata.setTitle(layer.title)
+    columns = [f"{column.name}: {column.description}" for column in layer.columns]
+    metadata.setAbstract("\n".join(columns))
+    metadata.setHistory(list(history))
+    loaded.setMetadata(metadata)
 
 
 def _results(project: QgsProject) -> QgsLayerTreeGroup:

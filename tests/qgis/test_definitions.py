@@ -1,0 +1,144 @@
+"""What QGIS asks for is what the declarations say, and so what the command line asks for."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any
+
+import pytest
+
+pytest.importorskip("qgis.core", reason="QGIS is not here")
+
+from qgis.core import (
+    QgsApplication,
+    QgsProcessing,
+    QgsProcessingParameterDefinition,
+    QgsProcessingParameterFeatureSink,
+    QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterFileDestination,
+    QgsProcessingParameterNumber,
+)
+
+from urban_processing.algorithms import AlgorithmSpec, OutputKind, specs
+from urban_processing.algorithms.json_schema import description
+from urban_processing.cli.options import command_parameters
+from urban_processing.params import ParamField
+from urban_processing.schema import LAID_OUT
+
+FREE = 1e300
+"""QGIS's own limits of a number without limits lie beyond this, or at the ends of 32 bits."""
+
+SHELL_ONLY = {
+    "cli": {
+        *("place", "layer", "where"),  # QGIS has layers, filters and selections
+        *("overwrite", "record_seconds", "export", "export_format", "quiet"),
+    },
+    "qgis": set[str](),
+}
+
+
+@pytest.fixture(params=specs(), ids=lambda spec: spec.name)
+def spec(request: pytest.FixtureRequest) -> AlgorithmSpec:
+    return request.param  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def algorithm(provider: Any, spec: AlgorithmSpec) -> Any:
+    found = QgsApplication.processingRegistry().algorithmById(f"urban_processing:{spec.name}")
+    assert found is not None
+    return found
+
+
+def test_every_algorithm_of_the_registry_is_in_the_toolbox(provider: Any) -> None:
+    shown = [(a.name(), a.displayName(), a.group()) for a in provider.algorithms()]
+    assert sorted(shown) == sorted((s.name, s.title, s.group) for s in specs())
+
+
+def test_texts_are_those_of_the_declaration(algorithm: Any, spec: AlgorithmSpec) -> None:
+    assert algorithm.shortDescription() == spec.summary
+    for source in spec.references:
+        assert source in algorithm.shortHelpString()
+    assert not algorithm.icon().isNull()
+    assert "parcels" in algorithm.tags()
+
+
+def test_names_are_those_of_the_command_line(algorithm: Any, spec: AlgorithmSpec) -> None:
+    options = {option.name for option in command_parameters(spec)} - SHELL_ONLY["cli"]
+    sinks = {
+        d.name().lower()
+        for d in algorithm.parameterDefinitions()
+        if isinstance(d, QgsProcessingParameterFeatureSink)
+    }
+    asked = {d.name().lower() for d in algorithm.parameterDefinitions()} - sinks
+    assert asked - SHELL_ONLY["qgis"] == options
+    layouts = [o.name for o in spec.outputs if o.kind is OutputKind.LAYOUT]
+    assert sinks == {f"{name}_{layer.name}" for name in layouts for layer in LAID_OUT}
+
+
+def test_defaults_limits_and_helps_are_those_of_the_declaration(
+    algorithm: Any, spec: AlgorithmSpec
+) -> None:
+    schema = description(spec)["parameters"]["properties"]
+    for field in spec.params.fields():
+        asked = algorithm.parameterDefinition(field.name.upper())
+        declared = schema[field.name]
+        assert default_of(asked, field) == declared["default"]
+        assert declared["description"] in asked.help()
+        unit = declared.get("x-unit")
+        assert asked.description() == declared["title"] + (f" [{unit}]" if unit else "")
+        advanced = QgsProcessingParameterDefinition.Flag.FlagAdvanced
+        assert bool(asked.flags() & advanced) is bool(declared.get("x-advanced"))
+        optional = QgsProcessingParameterDefinition.Flag.FlagOptional
+        assert bool(asked.flags() & optional) is field.optional
+        if isinstance(asked, QgsProcessingParameterNumber):
+            least = declared.get("minimum", declared.get("exclusiveMinimum"))
+            assert limit(asked.minimum()) == least
+            assert limit(asked.maximum()) == declared.get("maximum")
+            whole = asked.dataType() == QgsProcessingParameterNumber.Type.Integer
+            assert whole is (field.kind is int)
+            # a distance that hangs on a layer would change its unit with the layer
+            assert asked.type() == "number"
+
+
+def default_of(asked: Any, field: ParamField) -> Any:
+    if issubclass(field.kind, enum.Enum) and asked.defaultValue() is not None:
+        assert asked.options() == [
+            field.param.labels.get(member.value, member.value) for member in field.kind
+        ]
+        return list(field.kind)[asked.defaultValue()].value
+    return asked.defaultValue()
+
+
+def limit(value: float) -> float | None:
+    return None if abs(value) > FREE or abs(value) >= 2**31 - 1 else value
+
+
+def test_inputs_are_layers_of_the_right_kind(algorithm: Any) -> None:
+    boundary = algorithm.parameterDefinition("BOUNDARY")
+    assert isinstance(boundary, QgsProcessingParameterFeatureSource)
+    assert boundary.dataTypes() == [QgsProcessing.SourceType.TypeVectorPolygon]
+    corners = algorithm.parameterDefinition("CORNERS")
+    assert corners.dataTypes() == [QgsProcessing.SourceType.TypeVectorPoint]
+
+
+def test_results_are_sinks_and_files_and_all_optional(algorithm: Any) -> None:
+    made = {d.name(): d for d in algorithm.destinationParameterDefinitions()}
+    optional = QgsProcessingParameterDefinition.Flag.FlagOptional
+    assert all(bool(d.flags() & optional) for d in made.values())
+    by_default = {name for name, d in made.items() if d.createByDefault()}
+    assert by_default == {
+        f"OUTPUT_{name}" for name in ("PARCELS", "STREETS", "JUNCTIONS", "ISSUES")
+    }
+    files = {n for n, d in made.items() if isinstance(d, QgsProcessingParameterFileDestination)}
+    assert files == {"OUTPUT", "PLOT"}
+    assert made["OUTPUT"].defaultFileExtension() == "gpkg"
+    assert made["PLOT"].defaultFileExtension() == "png"
+
+
+def test_it_can_run_as_a_batch_and_in_models(algorithm: Any) -> None:
+    from qgis.core import QgsProcessingAlgorithm
+
+    flags = QgsProcessingAlgorithm.Flag
+    assert algorithm.flags() & flags.FlagSupportsBatch
+    assert not algorithm.flags() & flags.FlagHideFromModeler
+    assert not algorithm.flags() & flags.FlagNoThreading
