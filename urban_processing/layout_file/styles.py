@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
+import xml.etree.ElementTree as ET  # nosec B405: written here, never parsed
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
