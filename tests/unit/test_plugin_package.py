@@ -21,16 +21,8 @@ import urban_processing
 
 ROOT = Path(__file__).resolve().parents[2]
 TOP = "urban_processing_qgis"
-ENGINE_NEEDS = {
-    "matplotlib",
-    "networkx",
-    "numpy",
-    "osgeo",
-    "processing",
-    "qgis",
-    "scipy",
-    "shapely",
-}
+ENGINE_NEEDS = {"matplotlib", "networkx", "numpy", "scipy", "shapely"}
+QGIS_HAS = {"osgeo", "processing", "qgis"}
 
 pytestmark = pytest.mark.skipif(
     not (ROOT / "qgis_plugin").is_dir(), reason="the plugin is not beside these tests"
