@@ -51,7 +51,9 @@ def _steps() -> Iterator[float]:
     toolbox.searchBox.setText("parcels")
     tree.expandAll()
     yield 2
-    toolbox.resize(420, toolbox.height())
+    toolbox.setFloating(True)
+    toolbox.resize(420, 260)
+    yield 1
     _save(toolbox, IMAGES / "qgis_toolbox.png")
 
     algorithm = QgsApplication.processingRegistry().createAlgorithmById(
@@ -66,7 +68,6 @@ def _steps() -> Iterator[float]:
 
     dialog.runButton().click()
     yield from _until(lambda: len(QgsProject.instance().mapLayers()) > 4)
-    _save(dialog, IMAGES / "qgis_log.png")
     dialog.close()
     toolbox.setVisible(False)
     QgsProject.instance().layerTreeRoot().findLayer(land.id()).setItemVisibilityChecked(False)

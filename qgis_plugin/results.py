@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +37,10 @@ _TYPES = {
     GeometryType.POLYGON: QgsWkbTypes.Type.Polygon,
     GeometryType.ANY: QgsWkbTypes.Type.Point,
 }
+
+
+_AT_ONCE = 1000
+"""Number of features that are handed to a sink at once, so that memory stays bounded."""
 
 
 def write_sink(
@@ -80,8 +86,11 @@ def write_sink(
         raise QgsProcessingException(algorithm.invalidSinkError(destinations.parameters, name))
     if table is not None:
         features = _features(layer, table, geometry, fields, several=bool(several))
-        if not made.addFeatures(features, QgsFeatureSink.Flag.FastInsert):
-            raise QgsProcessingException(f"{layer.title} could not be written: {made.lastError()}")
+        while some := list(itertools.islice(features, _AT_ONCE)):
+            if not made.addFeatures(some, QgsFeatureSink.Flag.FastInsert):
+                raise QgsProcessingException(
+                    f"{layer.title} could not be written: {made.lastError()}"
+                )
     if destinations.context.willLoadLayerOnCompletion(layer_id):
         group.will_load(layer, layer_id, destinations.context, algorithm.provider())
     return str(layer_id)
@@ -103,9 +112,8 @@ def _features(
     fields: QgsFields,
     *,
     several: bool,
-) -> list[QgsFeature]:
+) -> Iterator[QgsFeature]:
     wkb = [None] * len(table) if geometry is None else shapely.to_wkb(geometry).tolist()
-    out = []
     for row, shape in zip(zip(*field_values(layer, table), strict=True), wkb, strict=True):
         feature = QgsFeature(fields)
         feature.setAttributes(list(row))
@@ -115,5 +123,4 @@ def _features(
             if several:
                 made.convertToMultiType()
             feature.setGeometry(made)
-        out.append(feature)
-    return out
+        yield feature

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from urban_processing.schema import GeometryType, Layer
 
 QML_VERSION = "3.22.0"
+_LARGEST = 6
+"""Markers are no larger than so many millimetres."""
+
 _METRES, _MILLIMETRES = "RenderMetersInMapUnits", "MM"
 
 _PAPER = "246,244,238,215"
@@ -162,6 +165,7 @@ def _street(color: str, factor: float) -> list[ET.Element]:
 def _marker(
     shape: str, color: str, *, metres: float, at_least: float, outline: str = _CASING
 ) -> ET.Element:
+    """Draw a marker of a size on the ground, within what reads well; in a legend in 2 mm."""
     return _layer(
         "SimpleMarker",
         {
@@ -170,10 +174,10 @@ def _marker(
             "outline_color": outline,
             "outline_width": "0.15",
             "outline_width_unit": _MILLIMETRES,
-            "size": str(metres),
-            "size_unit": _METRES,
-            "size_map_unit_scale": f"3x:0,0,1,{at_least},1,6",
+            "size": "2",
+            "size_unit": _MILLIMETRES,
         },
+        data_defined={"size": f"clamp({at_least}, {1000 * metres:g} / @map_scale, {_LARGEST})"},
     )
 
 
