@@ -71,7 +71,6 @@ def _steps() -> Iterator[float]:
     dialog.close()
     toolbox.setVisible(False)
     QgsProject.instance().layerTreeRoot().findLayer(land.id()).setItemVisibilityChecked(False)
-    QgsProject.instance().setCrs(next(iter(QgsProject.instance().mapLayers().values())).crs())
     parcels = QgsProject.instance().mapLayersByName("Parcels")[0]
     QgsProject.instance().setCrs(parcels.crs())
     canvas = iface.mapCanvas()

@@ -103,7 +103,8 @@ def metadata() -> str:
         "changelog": _newest(changes),
     }
     text = (ROOT / "qgis_plugin" / "metadata.txt").read_text(encoding="utf-8")
-    return text + "".join(f"{key}={value}\n" for key, value in known.items())
+    # QGIS reads the file with interpolation
+    return text + "".join(f"{key}={value.replace('%', '%%')}\n" for key, value in known.items())
 
 
 def version() -> str:
