@@ -9,6 +9,7 @@ from typing import Any
 from qgis.core import (
     QgsProcessingAlgorithm,
     QgsProcessingContext,
+    QgsProcessingException,
     QgsProcessingFeedback,
 )
 from qgis.PyQt.QtCore import QCoreApplication
@@ -94,7 +95,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         good, message = super().checkParameterValues(parameters, context)
         if not good:
             return good, message
-        problems = self.spec.params.problems_with(self._values(parameters, context), self._label)
+        problems = self._problems(self._values(parameters, context))
         problems += Destinations(self, parameters, context).problems()
         return not problems, "\n".join(problems)
 
@@ -106,12 +107,20 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
     ) -> dict[str, Any]:
         """Read the layers, run the engine, and give what it made to sinks and files."""
         destinations = Destinations(self, parameters, context)
+        values = self._values(parameters, context)
+        problems = self._problems(values)  # in a model nobody has looked before
+        if problems:
+            raise QgsProcessingException("\n".join(problems))
         with errors_as_sentences():
             dependencies.require_engine(maps=bool(destinations.of_kind(OutputKind.MAP)))
             from qgis_plugin.run import run
 
-            params = self.spec.params.from_values(self._values(parameters, context))
+            params = self.spec.params.from_values(values)
             return run(self, params, destinations, progress_to(feedback), feedback)
+
+    def _problems(self, values: dict[str, Any]) -> list[str]:
+        """Say what is wrong with the values, with the names that the dialog shows."""
+        return self.spec.params.problems_with(values, self._label)
 
     def _values(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Any]:
         """Values of the parameters that were given, as the parameter class takes them."""

@@ -312,3 +312,17 @@ def test_a_python_that_is_too_old_is_told(
     assert plugin.provider is None
     assert "needs Python 3.11 or newer, and this QGIS has 3.9" in said[0]
     plugin.unload()
+
+
+def test_values_are_checked_where_nobody_has_looked_before(
+    provider: Any, layer: Any, feedback: Any
+) -> None:
+    """As in a model, which runs its steps without checking their values."""
+    from qgis.core import QgsApplication
+
+    algorithm = QgsApplication.processingRegistry().createAlgorithmById(ID)
+    context = QgsProcessingContext()
+    land = layer([square(100)])
+    _, good = algorithm.run({"BOUNDARY": land, "PARCELS": 4, "MIN_AREA": 9}, context, feedback)
+    assert not good
+    assert "“Smallest parcel” or “Number of parcels”, not both" in "\n".join(feedback.errors)

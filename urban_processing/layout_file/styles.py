@@ -165,7 +165,7 @@ def _street(color: str, factor: float) -> list[ET.Element]:
 def _marker(
     shape: str, color: str, *, metres: float, at_least: float, outline: str = _CASING
 ) -> ET.Element:
-    """Draw a marker of a size on the ground, within what reads well; in a legend in 2 mm."""
+    """Draw a marker of a size on the ground, within what reads well; small in a legend."""
     return _layer(
         "SimpleMarker",
         {
@@ -174,7 +174,7 @@ def _marker(
             "outline_color": outline,
             "outline_width": "0.15",
             "outline_width_unit": _MILLIMETRES,
-            "size": "2",
+            "size": str(max(at_least, 1.2)),
             "size_unit": _MILLIMETRES,
         },
         data_defined={"size": f"clamp({at_least}, {1000 * metres:g} / @map_scale, {_LARGEST})"},
