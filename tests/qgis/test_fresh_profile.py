@@ -17,6 +17,7 @@ import pytest
 pytest.importorskip("qgis.core", reason="QGIS is not here")
 
 import pyogrio
+from qgis.core import Qgis
 
 import urban_processing as up
 from urban_processing.metrics import Table, certify
@@ -55,9 +56,9 @@ def process(profile: Path) -> Process:
             "PYTHONDONTWRITEBYTECODE": "1",
             "LC_ALL": "C.UTF-8",
         }
-        startup = os.environ.get("PYQGIS_STARTUP")
-        if startup:
-            environment["PYQGIS_STARTUP"] = startup
+        if Qgis.QGIS_VERSION_INT >= 33800:  # loads shapely itself: as the plugin then advises
+            startup = profile / "profile/python/plugins/urban_processing_qgis"
+            environment["PYQGIS_STARTUP"] = str(startup / "import_shapely_first.py")
         return subprocess.run(
             [str(PROGRAM), *arguments],
             env=environment,
