@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import io
+import os
 import sys
 import zipfile
 from collections.abc import Callable, Iterator
@@ -12,6 +13,8 @@ from typing import Any
 
 import pytest
 from in_qgis import ID
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before the application starts
 
 ROOT = Path(__file__).resolve().parents[2]
 
