@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 
@@ -132,30 +133,18 @@ def test_values_of_expressions_are_taken(run: Run, layer: Callable[..., Any]) ->
 @pytest.fixture
 def another(provider: Any, engine: Callable[[str], Any]) -> Iterator[Any]:
     """A provider with an algorithm that nobody has written for QGIS."""
-    from dataclasses import dataclass
-    from typing import Annotated
-
     spec, base = engine("engine.algorithms.spec"), engine("engine.params.base")
-    progress = engine("engine.progress")
     errors = engine("engine.errors")
-    choice = engine("engine.params.cogenerate").StreetPattern
-
-    @dataclass(frozen=True, kw_only=True)
-    class Params(base.Params):  # type: ignore[name-defined,misc]
-        raised: Annotated[float, base.Param(label="Raised by", help="By.", unit="m²")] = 1.5
-        named: Annotated[str, base.Param(label="Name", help="A name.")] = "a"
-        on: Annotated[bool, base.Param(label="On", help="Whether.", advanced=True)] = False
-        way: Annotated[
-            choice | None,  # type: ignore[valid-type]
-            base.Param(label="Way", help="Which way."),
-        ] = None
-
-    Params.__annotations__ = {  # as if they stood at the top of a module
-        "raised": Annotated[float, base.Param(label="Raised by", help="By.", unit="m²")],
-        "named": Annotated[str, base.Param(label="Name", help="A name.")],
-        "on": Annotated[bool, base.Param(label="On", help="Whether.", advanced=True)],
-        "way": Annotated[choice | None, base.Param(label="Way", help="Which way.")],
-    }
+    pattern = engine("engine.params.cogenerate").StreetPattern
+    declared = [
+        ("raised", Annotated[float, base.Param(label="By", help="By what.", unit="m²")], 1.5),
+        ("named", Annotated[str, base.Param(label="Name", help="A name.")], "a"),
+        ("on", Annotated[bool, base.Param(label="On", help="Whether.", advanced=True)], False),
+        ("way", Annotated[pattern | None, base.Param(label="Way", help="Which way.")], None),
+    ]
+    params_class = dataclasses.make_dataclass(
+        "Params", declared, bases=(base.Params,), frozen=True, kw_only=True
+    )
     seen: list[Any] = []
 
     def rerun(inputs: Mapping[str, Any], params: Any, told: Any) -> Mapping[str, Any]:
@@ -172,7 +161,7 @@ def another(provider: Any, engine: Callable[[str], Any]) -> Iterator[Any]:
         group="Tests",
         summary="Lower the smallest area.",
         description="A layout in, a layout out.",
-        params=Params,
+        params=params_class,
         inputs=(
             spec.Input(name="layout", kind=spec.InputKind.LAYOUT, label="Layout", help="A file."),
         ),
@@ -183,7 +172,6 @@ def another(provider: Any, engine: Callable[[str], Any]) -> Iterator[Any]:
         ),
         run=rerun,
     )
-    assert progress
     provider_class = engine("provider").UrbanProcessingProvider
 
     class Another(provider_class):  # type: ignore[valid-type,misc]

@@ -485,6 +485,8 @@ def test_ctrl_c_stops_a_real_run(tmp_path: Path) -> None:
         text=True,
         cwd=tmp_path,
         env=_environment(),
+        # shells start what runs in the background with Ctrl-C ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as process:
         assert process.stderr is not None
         said = process.stderr.readline()
