@@ -11,7 +11,7 @@ from qgis.core import QgsProcessingFeedback
 
 from qgis_plugin.crs import crs_of
 from qgis_plugin.destinations import Destinations
-from qgis_plugin.feedback import in_qgis, stop_if_cancelled
+from qgis_plugin.feedback import in_qgis
 from qgis_plugin.geopackage import OGR
 from qgis_plugin.results import write_sink
 from qgis_plugin.sources import Sources
@@ -40,7 +40,7 @@ def run(
     """Read the inputs, run the engine, write files and sinks, and say what was made.
 
     Nothing is written before everything has been worked out, so that a run that is cancelled
-    leaves nothing.
+    leaves nothing. Files come before layers: where one cannot be written there are no layers.
 
     Returns
     -------
@@ -63,12 +63,12 @@ def run(
     }
     progress.update(_COMPUTING, "Measuring the layout")
     broken = [check for layout in layouts.values() for check in layout.certificate.failures]
+    # the last moment at which a run can be cancelled: what is written from here on stays
     progress.update(0.95, "Writing the results")
     results: dict[str, Any] = {}
     for name, (output, path) in destinations.files.items():
         _write_file(output, layouts, path)
         results[name] = str(path)
-    stop_if_cancelled(feedback)
     groups = {
         name: ResultGroup(_title(sources.name, spec, params), _history(layout))
         for name, layout in layouts.items()
@@ -118,10 +118,9 @@ def _write_file(output: Output, layouts: Mapping[str, MeasuredLayout], path: Pat
 
 def _title(land: str, spec: AlgorithmSpec, params: Params) -> str:
     """Return the name of the group of results: land, algorithm and seed."""
-    seed = getattr(params, "seed", None)
-    return ", ".join(
-        [*filter(None, [land, spec.name]), *([] if seed is None else [f"seed {seed}"])]
-    )
+    seed = params.as_dict().get("seed")
+    words = [land, spec.name, "" if seed is None else f"seed {seed}"]
+    return ", ".join(filter(None, words))
 
 
 def _history(layout: MeasuredLayout) -> list[str]:
