@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 from qgis.core import (
+    QgsCoordinateReferenceSystem,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingException,
@@ -16,7 +17,7 @@ from qgis.PyQt.QtCore import QCoreApplication
 from qgis.PyQt.QtGui import QIcon
 
 from qgis_plugin import dependencies
-from qgis_plugin.definitions import definitions, parameter_name
+from qgis_plugin.definitions import CRS, definitions, parameter_name
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import errors_as_sentences, progress_to
 from urban_processing.algorithms import AlgorithmSpec, OutputKind
@@ -95,7 +96,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         good, message = super().checkParameterValues(parameters, context)
         if not good:
             return good, message
-        problems = self._problems(self._values(parameters, context))
+        problems = self._problems(parameters, context)
         problems += Destinations(self, parameters, context).problems()
         return not problems, "\n".join(problems)
 
@@ -107,20 +108,26 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
     ) -> dict[str, Any]:
         """Read the layers, run the engine, and give what it made to sinks and files."""
         destinations = Destinations(self, parameters, context)
-        values = self._values(parameters, context)
-        problems = self._problems(values)  # in a model nobody has looked before
+        problems = self._problems(parameters, context)  # in a model nobody has looked before
         if problems:
             raise QgsProcessingException("\n".join(problems))
         with errors_as_sentences():
             dependencies.require_engine(maps=bool(destinations.of_kind(OutputKind.MAP)))
             from qgis_plugin.run import run
 
-            params = self.spec.params.from_values(values)
+            params = self.spec.params.from_values(self._values(parameters, context))
             return run(self, params, destinations, progress_to(feedback), feedback)
 
-    def _problems(self, values: dict[str, Any]) -> list[str]:
+    def _problems(self, parameters: dict[str, Any], context: QgsProcessingContext) -> list[str]:
         """Say what is wrong with the values, with the names that the dialog shows."""
-        return self.spec.params.problems_with(values, self._label)
+        values = self._values(parameters, context)
+        problems = self.spec.params.problems_with(values, self._label)
+        crs = parameters.get(CRS)
+        none = crs in (None, "") or isinstance(crs, QgsCoordinateReferenceSystem)
+        if not none and not self.parameterAsCrs(parameters, CRS, context).isValid():
+            label = _QUOTED.format(self.parameterDefinition(CRS).description())
+            problems.append(f"{label} is not known: {crs!r}. Give a code such as EPSG:32630.")
+        return problems
 
     def _values(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Any]:
         """Values of the parameters that were given, as the parameter class takes them."""

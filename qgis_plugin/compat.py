@@ -26,11 +26,12 @@ _TYPES = {
 
 
 def field(column: Column) -> QgsField:
-    """Return the field of a column, with its readable name and what it means."""
-    made = QgsField(column.name, _TYPES[column.dtype])
-    made.setAlias(column.label)
-    made.setComment(column.description)
-    return made
+    """Return the field of a column.
+
+    Its readable name is given to the loaded layer: most formats keep none, and QGIS from 3.40 on
+    warns of each.
+    """
+    return QgsField(column.name, _TYPES[column.dtype])
 
 
 def geographic_base(crs: QgsCoordinateReferenceSystem) -> Any:

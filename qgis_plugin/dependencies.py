@@ -39,20 +39,26 @@ def require_engine(*, maps: bool = False) -> None:
         With one sentence for each package that is missing, too old, or does not work.
     """
     wanted = {name: least for name, least in _required() if maps or name != FOR_MAPS}
-    missing, old = [], []
+    missing, old, broken = [], [], []
     with deep_binding():
         for name, least in wanted.items():
             if importlib.util.find_spec(name) is None:
                 missing.append(f"{name} >= {least}")
                 continue
-            found = importlib.import_module(name).__version__
+            try:
+                found = importlib.import_module(name).__version__
+            except ImportError as error:
+                broken.append(f"{name} ({error})")
+                continue
             if _numbers(found) < _numbers(least):
                 old.append(f"{name} {found} ({least} or newer is needed)")
-    problems = []
+    problems, again = [], _how_to_install(wanted)
     if missing:
-        problems.append(f"This QGIS lacks {_listed(missing)}. {_how_to_install(wanted)}")
+        problems.append(f"This QGIS lacks {_listed(missing)}. {again}")
     if old:
-        problems.append(f"Too old for this plugin: {_listed(old)}. {_how_to_install(wanted)}")
+        problems.append(f"Too old for this plugin: {_listed(old)}. {again}")
+    if broken:
+        problems.append(f"Installed, but not to be loaded: {_listed(broken)}. {again}")
     if not problems and not _shapely_works():
         problems.append(
             "The package shapely does not work inside this QGIS, because QGIS has loaded it "
@@ -106,7 +112,7 @@ def _how_to_install(packages: Iterable[str]) -> str:
     if sys.platform.startswith("linux"):
         distributed = " (a distribution's own packages may be too old)"
     return (
-        "Install it with the plugin QPIP, which reads the list of this plugin "
+        "Install with the plugin QPIP, which reads the list of this plugin "
         f"({REQUIREMENTS}){distributed}, or run in a terminal the Python of QGIS with "
         f"-m pip install --user {' '.join(packages)}. Then start QGIS again."
     )

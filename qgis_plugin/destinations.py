@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from qgis.core import (
+    QgsMapLayer,
+    QgsProcessing,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
+    QgsProcessingParameterFeatureSink,
     QgsProperty,
     QgsProviderRegistry,
+    QgsVectorFileWriter,
     QgsVectorLayer,
 )
 
 from qgis_plugin.definitions import SinkName, files, parameter_name, sinks
 from urban_processing.algorithms import InputKind, Output, OutputKind
-from urban_processing.paths import file_problems, geopackage_problems
+from urban_processing.paths import file_problems, geopackage_problems, map_problems
+
+_TABLE = re.compile(r"""ogr:dbname='([^']+)'\s+table="([^"]+)\"""")
+"""A table of a GeoPackage, as QGIS names a sink into it."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A file, or a table in it."""
+
+    path: Path
+    table: str | None = None
+
+    def replaces(self, other: Place) -> bool:
+        """Whether writing here destroys what is there."""
+        tables = {self.table, other.table}
+        return self.path == other.path and (None in tables or len(tables) == 1)
 
 
 class Destinations:
@@ -66,25 +88,36 @@ class Destinations:
     def problems(self) -> list[str]:
         """Return one sentence for each reason why a result cannot go where it is to."""
         problems: list[str] = []
-        taken: dict[Path, str] = dict.fromkeys(self._read(), "the input")
-        layouts = self.of_kind(OutputKind.LAYOUT)
-        written = {name: path for name, (_, path) in self.files.items()}
-        for name, path in {**self._sink_files(), **written}.items():
-            label = self.algorithm.parameterDefinition(name).description()
-            check = geopackage_problems if path in layouts else file_problems
-            problems += [f"{label}: {problem}" for problem in check(path)]
-            place = path.resolve()
-            if place in taken:
-                problems.append(f"{label} would replace {taken[place]} {path}: choose another.")
-            taken.setdefault(place, label)
+        taken = [(place, "the input") for place in self._read()]
+        checks = {
+            OutputKind.LAYOUT: geopackage_problems,
+            OutputKind.MAP: map_problems,
+        }
+        for name, place in self._sink_places().items():
+            label = self._label(name)
+            if place.table is None:
+                problems += [f"{label}: {problem}" for problem in file_problems(place.path)]
+            problems += _collisions(label, place, taken)
+        for name, (output, path) in self.files.items():
+            label = self._label(name)
+            problems += [f"{label}: {problem}" for problem in checks[output.kind](path)]
+            problems += _collisions(label, Place(path.resolve()), taken)
+            if output.kind is OutputKind.LAYOUT and path.resolve() in self._loaded():
+                problems.append(
+                    f"{label}: {path} is open in this project: remove its layers from it, or "
+                    "choose another name."
+                )
         return problems
+
+    def _label(self, name: str) -> str:
+        return str(self.algorithm.parameterDefinition(name).description())
 
     def _file(self, output: Output) -> Path:
         name = parameter_name(output.name)
         return Path(self.algorithm.parameterAsFileOutput(self.parameters, name, self.context))
 
-    def _sink_files(self) -> dict[str, Path]:
-        """Files of the sinks that go to a file of their own, by parameter."""
+    def _sink_places(self) -> dict[str, Place]:
+        """Where the sinks go that go to files, by parameter."""
         found = {}
         for sink in self.sinks:
             value = self.parameters[sink.parameter]
@@ -93,25 +126,55 @@ class Destinations:
             if isinstance(value, QgsProperty):
                 value = value.valueAsString(self.context.expressionContext(), "")[0]
             text = str(value)
-            if Path(text).suffix and ":" not in text[2:]:  # no `memory:`, `ogr:`, `postgis:`
-                found[sink.parameter] = Path(text)
+            table = _TABLE.match(text)
+            if table:
+                found[sink.parameter] = Place(Path(table[1]).resolve(), table[2])
+            elif text != QgsProcessing.TEMPORARY_OUTPUT and ":" not in text[2:]:
+                definition = self.algorithm.parameterDefinition(sink.parameter)
+                found[sink.parameter] = Place(_with_suffix(text, definition).resolve())
         return found
 
-    def _read(self) -> set[Path]:
-        """Files that the run reads."""
+    def _read(self) -> set[Place]:
+        """What the run reads from files."""
         found = set()
         for item in self.algorithm.spec.inputs:
-            value = self.parameters.get(parameter_name(item.name))
+            name = parameter_name(item.name)
+            value = self.parameters.get(name)
             if value in (None, ""):
                 continue
             if item.kind is InputKind.LAYOUT:
-                found.add(Path(str(value)).resolve())
+                found.add(Place(Path(str(value)).resolve()))
                 continue
-            layer = self.algorithm.parameterAsVectorLayer(
-                self.parameters, parameter_name(item.name), self.context
-            )
-            if isinstance(layer, QgsVectorLayer):
-                uri = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
-                if uri.get("path"):
-                    found.add(Path(uri["path"]).resolve())
+            layer = self.algorithm.parameterAsVectorLayer(self.parameters, name, self.context)
+            found |= _places_of(layer)
         return found
+
+    def _loaded(self) -> set[Path]:
+        """Files of the layers of the project."""
+        project = self.context.project()
+        layers = [] if project is None else project.mapLayers().values()
+        return {place.path for layer in layers for place in _places_of(layer)}
+
+
+def _places_of(layer: QgsMapLayer | None) -> set[Place]:
+    if not isinstance(layer, QgsVectorLayer):
+        return set()
+    uri = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
+    if not uri.get("path"):
+        return set()
+    return {Place(Path(uri["path"]).resolve(), uri.get("layerName") or None)}
+
+
+def _with_suffix(text: str, definition: QgsProcessingParameterFeatureSink) -> Path:
+    """Return the file that QGIS makes of a name: with its default suffix where it knows none."""
+    suffix = Path(text).suffix.lstrip(".")
+    if suffix and QgsVectorFileWriter.driverForExtension(suffix):
+        return Path(text)
+    return Path(f"{text}.{definition.defaultFileExtension()}")
+
+
+def _collisions(label: str, place: Place, taken: list[tuple[Place, str]]) -> list[str]:
+    """Say what a result would replace, and add it to what is taken."""
+    found = [what for other, what in taken if place.replaces(other)]
+    taken.append((place, label))
+    return [f"{label} would replace {what} {place.path}: choose another." for what in found[:1]]

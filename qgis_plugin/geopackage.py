@@ -159,10 +159,11 @@ def _os_errors() -> Iterator[None]:
 
 @contextmanager
 def _config_option(name: str, value: str) -> Iterator[None]:
-    """Set an option of GDAL for a moment."""
-    before = gdal.GetConfigOption(name)
-    gdal.SetConfigOption(name, value)
+    """Set an option of GDAL for a moment, for this thread alone where GDAL can."""
+    set_option = getattr(gdal, "SetThreadLocalConfigOption", gdal.SetConfigOption)
+    before = getattr(gdal, "GetThreadLocalConfigOption", gdal.GetConfigOption)(name)
+    set_option(name, value)
     try:
         yield
     finally:
-        gdal.SetConfigOption(name, before)
+        set_option(name, before)

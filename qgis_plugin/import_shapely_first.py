@@ -11,6 +11,8 @@ import sys
 if sys.platform.startswith("linux"):
     flags = sys.getdlopenflags()
     sys.setdlopenflags(os.RTLD_NOW | os.RTLD_LOCAL | os.RTLD_DEEPBIND)
-    with contextlib.suppress(ImportError):
-        import shapely  # noqa: F401
-    sys.setdlopenflags(flags)
+    try:
+        with contextlib.suppress(ImportError):
+            import shapely  # noqa: F401
+    finally:
+        sys.setdlopenflags(flags)

@@ -11,10 +11,11 @@ import shapely
 from qgis.core import (
     QgsCoordinateReferenceSystem,
     QgsFeatureRequest,
-    QgsFeatureSource,
     QgsGeometry,
     QgsProcessingContext,
     QgsProcessingException,
+    QgsProcessingFeatureSource,
+    QgsProcessingFeatureSourceDefinition,
     QgsProcessingFeedback,
     QgsWkbTypes,
 )
@@ -107,18 +108,46 @@ class Sources:
                 )
             return None
         return Features(
-            np.array([*self._geometries(source), None], dtype=object)[:-1],
+            np.array([*self._geometries(source, name), None], dtype=object)[:-1],
             source.sourceCrs() if source.sourceCrs().isValid() else None,
             source.sourceName(),
         )
 
-    def _geometries(self, source: QgsFeatureSource) -> list[shapely.Geometry | None]:
+    def _geometries(
+        self, source: QgsProcessingFeatureSource, name: str
+    ) -> list[shapely.Geometry | None]:
+        """Read geometries; what is invalid is treated as the user's settings say.
+
+        The settings are followed here: where QGIS itself stops the reading of a layer, its C++
+        exception passes through the Python interpreter and breaks it.
+        """
         request = QgsFeatureRequest().setNoAttributes()
+        unchecked = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
+        checks = QgsFeatureRequest.InvalidGeometryCheck
+        check = self._invalid_geometry_check(name)
         found = []
-        for feature in source.getFeatures(request):
+        for feature in source.getFeatures(request, unchecked):
             stop_if_cancelled(self.feedback)
-            found.append(_shapely(feature.geometry()))
+            geometry = feature.geometry()
+            if check == checks.GeometryNoCheck or geometry.isNull() or geometry.isGeosValid():
+                found.append(_shapely(geometry))
+                continue
+            what = f"Feature {feature.id()} of “{source.sourceName()}” has an invalid geometry"
+            if check == checks.GeometryAbortOnInvalid:
+                raise BoundaryError(
+                    f"{what}. Correct it, or choose another way with invalid features: in the "
+                    "advanced options of the layer, or in Settings > Options > Processing."
+                )
+            self.feedback.pushWarning(f"{what} and was left out.")
         return found
+
+    def _invalid_geometry_check(self, name: str) -> QgsFeatureRequest.InvalidGeometryCheck:
+        given = self.parameters.get(name)
+        if isinstance(given, QgsProcessingFeatureSourceDefinition):
+            own = QgsProcessingFeatureSourceDefinition.Flag.FlagOverrideDefaultGeometryCheck
+            if given.flags & own:
+                return given.geometryCheck
+        return self.context.invalidGeometryCheck()
 
 
 def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:

@@ -50,9 +50,8 @@ class ResultGroup:
         context: QgsProcessingContext,
         provider: UrbanProcessingProvider,
     ) -> None:
-        """Have a layer named, styled and grouped once QGIS has loaded it."""
+        """Have a layer styled and grouped once QGIS has loaded it."""
         details = context.layerToLoadOnCompletionDetails(layer_id)
-        details.name = layer.title
         style = ResultStyle(layer, self, provider)
         provider.styles.append(style)
         details.setPostProcessor(style)
@@ -94,12 +93,12 @@ class ResultStyle(QgsProcessingLayerPostProcessorInterface):
     ) -> None:
         """Style and place a layer, once it is in the project."""
         del feedback
+        self.provider.styles.remove(self)
         apply_style(self.layer, loaded)
         describe(self.layer, loaded, self.group.history)
         project = context.project()
         if project is not None:
             self.group.place(self.layer, loaded, project)
-        self.provider.styles.remove(self)
 
 
 def apply_style(layer: Layer, loaded: QgsVectorLayer) -> None:

@@ -6,6 +6,9 @@ import os
 from pathlib import Path
 
 GEOPACKAGE = ".gpkg"
+MAPS = (".png", ".svg", ".pdf")
+"""Kinds of files that a map can be written to."""
+
 _SIDE_FILES = ("-journal", "-wal")
 
 
@@ -43,4 +46,12 @@ def geopackage_problems(target: Path) -> list[str]:
             f"The output {target} is open in another program ({named} lies beside it): close it "
             "there, or choose another name."
         )
+    return problems
+
+
+def map_problems(target: Path) -> list[str]:
+    """Return why a map cannot be written to a path; nothing where it can."""
+    problems = file_problems(target)
+    if target.suffix.lower() not in MAPS:
+        problems.append(f"The map {target} must end in one of {', '.join(MAPS)}.")
     return problems

@@ -326,3 +326,77 @@ def test_values_are_checked_where_nobody_has_looked_before(
     _, good = algorithm.run({"BOUNDARY": land, "PARCELS": 4, "MIN_AREA": 9}, context, feedback)
     assert not good
     assert "“Smallest parcel” or “Number of parcels”, not both" in "\n".join(feedback.errors)
+
+
+def test_an_invalid_geometry_does_not_harm_later_runs(
+    layer: Any, feedback: Any, provider: Any
+) -> None:
+    """In a task as the dialog starts it: QGIS's own stop would break the interpreter."""
+    from qgis.core import QgsApplication, QgsProcessingAlgRunnerTask
+
+    bad, good = layer([square(100), BOW_TIE]), layer([square(100)])
+    context = QgsProcessingContext()
+    context.setInvalidGeometryCheck(check("GeometryAbortOnInvalid"))
+    algorithm = QgsApplication.processingRegistry().createAlgorithmById(ID)
+    for land, works in ((bad, False), (good, True)) * 3:
+        parameters = {"BOUNDARY": land, "PARCELS": 4, "OUTPUT_PARCELS": TEMPORARY}
+        outcome: list[bool] = []
+        task = QgsProcessingAlgRunnerTask(algorithm, parameters, context, feedback)
+        task.executed.connect(lambda done, results, to=outcome: to.append(done))
+        QgsApplication.taskManager().addTask(task)
+        while not outcome:
+            QgsApplication.processEvents()
+        assert outcome == [works]
+    assert any("has an invalid geometry" in error for error in feedback.errors)
+
+
+def test_an_unknown_crs_is_no_silence(run: Run, layer: Any) -> None:
+    for text in ("EPSG:999999", "bogus"):
+        said = refused(run, layer([square(100)]), PARCELS=4, CRS=text)
+        assert f"“CRS to work in” is not known: '{text}'" in said
+
+
+def test_results_replace_nothing_by_other_names_of_files(
+    run: Run, sample: Callable[[str], Path], tmp_path: Path
+) -> None:
+    land = tmp_path / "land.gpkg"
+    land.write_bytes(sample("rect").read_bytes())
+    before = land.read_bytes()
+    # QGIS adds the suffix by itself
+    said = refused(run, str(land), PARCELS=4, OUTPUT_PARCELS=str(land.with_suffix("")))
+    assert "would replace the input" in said
+    table = f"ogr:dbname='{land}' table=\"boundary\" (geom)"
+    source = f"{land}|layername=boundary"
+    assert "would replace the input" in refused(run, source, PARCELS=4, OUTPUT_PARCELS=table)
+    same = str(tmp_path / "same")
+    said = refused(run, source, PARCELS=4, OUTPUT_PARCELS=same, OUTPUT_STREETS=f"{same}.gpkg")
+    assert "Streets would replace Parcels" in said
+    assert land.read_bytes() == before
+    # another table of the input's file harms nothing
+    run(source, PARCELS=4, OUTPUT_PARCELS=table.replace("boundary", "parcels"))
+    import pyogrio
+
+    assert sorted(pyogrio.list_layers(land)[:, 0]) == ["boundary", "parcels"]
+
+
+def test_a_layout_file_of_the_project_is_not_replaced(
+    layer: Any, sample: Callable[[str], Path], tmp_path: Path, feedback: Any, provider: Any
+) -> None:
+    from qgis.core import QgsVectorLayer
+
+    target = tmp_path / "layout.gpkg"
+    target.write_bytes(sample("rect").read_bytes())
+    opened = QgsVectorLayer(f"{target}|layername=boundary", "boundary", "ogr")
+    QgsProject.instance().addMapLayer(opened)
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    try:
+        with pytest.raises(QgsProcessingException, match="is open in this project"):
+            processing.run(
+                ID,
+                {"BOUNDARY": layer([square(100)]), "PARCELS": 4, "OUTPUT": str(target)},
+                context=context,
+                feedback=feedback,
+            )
+    finally:
+        QgsProject.instance().removeMapLayer(opened.id())

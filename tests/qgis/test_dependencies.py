@@ -140,3 +140,18 @@ def test_nothing_heavy_is_loaded_before_an_algorithm_runs(plugins: Path) -> None
     loaded = set(json.loads(done.stdout.splitlines()[-1]))
     assert "urban_processing_qgis" in loaded
     assert not loaded & (HEAVY | {"shapely", "urban_processing"})
+
+
+def test_a_package_that_cannot_be_loaded_is_named(
+    dependencies: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load = importlib.import_module
+
+    def import_module(name: str) -> Any:
+        if name == "scipy":
+            raise ImportError("numpy.core.multiarray failed to import")
+        return load(name)
+
+    monkeypatch.setattr(dependencies.importlib, "import_module", import_module)
+    with pytest.raises(Exception, match=r"not to be loaded: scipy \(numpy\.core\.multiarray"):
+        dependencies.require_engine()

@@ -229,3 +229,14 @@ def test_styles_load_from_the_layout_file_too(
     ]
     assert labels[0] == labels[1]
     assert processing  # imported for its side of the toolbox
+
+
+def test_names_that_the_user_gave_are_kept(
+    load: Callable[..., Any], project: Any, sample: Callable[[str], Path]
+) -> None:
+    from qgis.core import QgsProcessingOutputLayerDefinition
+
+    named = QgsProcessingOutputLayerDefinition(TEMPORARY, project)
+    named.destinationName = "My parcels"
+    load(str(sample("rect")), PARCELS=10, OUTPUT_PARCELS=named)
+    assert len(project.mapLayersByName("My parcels")) == 1

@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 from urban_processing.errors import OutputError, ParameterError
 from urban_processing.io.frames import GeoLayout
 from urban_processing.layout import Layout
+from urban_processing.paths import map_problems
 from urban_processing.report.legend import _round_length
-from urban_processing.report.map import check_map_output, plot_layout
+from urban_processing.report.map import plot_layout
 
 
 @pytest.fixture
@@ -102,9 +103,9 @@ def test_notebooks_show_the_figure(layout: Layout) -> None:
 
 
 def test_bad_paths_are_refused(layout: Layout, tmp_path: Path) -> None:
-    problems = check_map_output(tmp_path / "no" / "a.jpg")
+    problems = map_problems(tmp_path / "no" / "a.jpg")
     assert len(problems) == 2
-    assert check_map_output(tmp_path / "a.PNG") == []
+    assert map_problems(tmp_path / "a.PNG") == []
     with pytest.raises(OutputError, match=r"\.png, \.svg, \.pdf"):
         plot_layout(layout, tmp_path / "a.txt")
 

@@ -18,9 +18,9 @@ def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
 
         return check_output(path, overwrite=overwrite)
     if output.kind is OutputKind.MAP:
-        from urban_processing.report.map import check_map_output
+        from urban_processing.paths import map_problems
 
-        return [*check_map_output(path), *_in_the_way(path, overwrite)]
+        return [*map_problems(path), *_in_the_way(path, overwrite)]
     from urban_processing.io.exports import check_export
 
     try:

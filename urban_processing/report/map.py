@@ -20,7 +20,7 @@ from matplotlib.path import Path as Outline
 from urban_processing.errors import OutputError, ParameterError
 from urban_processing.layout import Layout
 from urban_processing.metrics.tables import Table, layout_tables
-from urban_processing.paths import file_problems
+from urban_processing.paths import map_problems
 from urban_processing.report.legend import (
     draw_colour_bar,
     draw_legend,
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from urban_processing.metrics import MeasuredLayout
-
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Kinds of files that a map can be written to."""
 
 DOTS_PER_INCH = 200
 
@@ -124,17 +121,8 @@ def plot_layout(
     return figure
 
 
-def check_map_output(path: str | PathLike[str]) -> list[str]:
-    """Return why a map cannot be written to a path; nothing where it can."""
-    target = Path(path)
-    problems = file_problems(target)
-    if target.suffix.lower() not in SUFFIXES:
-        problems.append(f"The map {target} must end in one of {', '.join(SUFFIXES)}.")
-    return problems
-
-
 def _checked(path: Path) -> Path:
-    problems = check_map_output(path)
+    problems = map_problems(path)
     if problems:
         raise OutputError(problems)
     return path
