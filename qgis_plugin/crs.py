@@ -38,7 +38,7 @@ class QgisCrs:
         ellipsoid = QgsEllipsoidUtils.ellipsoidParameters(crs.ellipsoidAcronym())
         known = ellipsoid.valid and ellipsoid.semiMajor > 0
         return CrsFacts(
-            name=crs.description(),
+            name=crs.description() or "a CRS without a name",
             projected=not crs.isGeographic(),
             geographic=crs.isGeographic(),
             unit=QgsUnitTypes.toString(unit),
