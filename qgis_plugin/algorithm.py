@@ -17,7 +17,7 @@ from qgis.PyQt.QtCore import QCoreApplication
 from qgis.PyQt.QtGui import QIcon
 
 from qgis_plugin import dependencies
-from qgis_plugin.definitions import CRS, definitions, parameter_name
+from qgis_plugin.definitions import CRS, definitions, is_given, parameter_name
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import errors_as_sentences, progress_to
 from urban_processing.algorithms import AlgorithmSpec, OutputKind
@@ -123,8 +123,8 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         values = self._values(parameters, context)
         problems = self.spec.params.problems_with(values, self._label)
         crs = parameters.get(CRS)
-        none = crs in (None, "") or isinstance(crs, QgsCoordinateReferenceSystem)
-        if not none and not self.parameterAsCrs(parameters, CRS, context).isValid():
+        named = is_given(parameters, CRS) and not isinstance(crs, QgsCoordinateReferenceSystem)
+        if named and not self.parameterAsCrs(parameters, CRS, context).isValid():
             label = _QUOTED.format(self.parameterDefinition(CRS).description())
             problems.append(f"{label} is not known: {crs!r}. Give a code such as EPSG:32630.")
         return problems
@@ -133,7 +133,7 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         """Values of the parameters that were given, as the parameter class takes them."""
         values = {}
         for field in self.spec.params.fields():
-            if parameters.get(parameter_name(field.name)) not in (None, ""):
+            if is_given(parameters, parameter_name(field.name)):
                 values[field.name] = self._value(field, parameters, context)
         return values
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,12 +34,17 @@ _CRS_HELP = (
     "own if it is metric and true to area, else UTM or a local equal-area projection."
 )
 _SELECTION = " Only the selected features, if the box is ticked."
-_POLYGON = QgsProcessing.SourceType.TypeVectorPolygon
+_LAYERS = {
+    InputKind.BOUNDARY: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.CORNER_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+}
+"""Inputs that are layers, and their geometry."""
+
 _SINK_TYPES = {
     GeometryType.NONE: QgsProcessing.SourceType.TypeVector,
     GeometryType.POINT: QgsProcessing.SourceType.TypeVectorPoint,
     GeometryType.LINE: QgsProcessing.SourceType.TypeVectorLine,
-    GeometryType.POLYGON: _POLYGON,
+    GeometryType.POLYGON: QgsProcessing.SourceType.TypeVectorPolygon,
     GeometryType.ANY: QgsProcessing.SourceType.TypeVectorPoint,
 }
 """Geometry of the sink of a layer; places stand for areas where a layer has both."""
@@ -49,7 +54,7 @@ _FILES = {
     OutputKind.MAP: "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)",
 }
 """Outputs that are single files. An export, a folder of plain files, is none of QGIS's: each
-sink goes to a file of any format."""
+sink goes to a file of its own."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,11 @@ def parameter_name(name: str) -> str:
     return name.upper()
 
 
+def is_given(parameters: Mapping[str, Any], name: str) -> bool:
+    """Whether the user gave a parameter; forms give None or nothing for what is left empty."""
+    return parameters.get(name) not in (None, "")
+
+
 def sinks(spec: AlgorithmSpec) -> Iterator[SinkName]:
     """Yield the sinks of an algorithm in the order of asking: those made by default first."""
     for output in spec.outputs:
@@ -95,7 +105,7 @@ def input_of(spec: AlgorithmSpec, kind: InputKind) -> Input | None:
 def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinition]:
     """Yield everything that is asked for: inputs, parameters, sinks, files."""
     for item in spec.inputs:
-        yield _helped(_INPUTS[item.kind](item), item.help + _INPUT_NOTES.get(item.kind, ""))
+        yield _input(item)
     fields = [field for panel in spec.panels().values() for field in panel]
     for field in fields:
         if not field.param.advanced:
@@ -122,35 +132,21 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
         yield _helped(definition, output.help)
 
 
-def _polygons(item: Input) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterFeatureSource(
-        parameter_name(item.name), item.label, [_POLYGON], optional=not item.required
-    )
-
-
-def _points(item: Input) -> QgsProcessingParameterDefinition:
-    point = QgsProcessing.SourceType.TypeVectorPoint
-    return QgsProcessingParameterFeatureSource(
-        parameter_name(item.name), item.label, [point], optional=not item.required
-    )
-
-
-def _layout_file(item: Input) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterFile(
-        parameter_name(item.name),
+def _input(item: Input) -> QgsProcessingParameterDefinition:
+    """Return the definition of an input: a layer, or the file of a layout."""
+    name, optional = parameter_name(item.name), not item.required
+    if item.kind in _LAYERS:
+        kinds = [_LAYERS[item.kind]]
+        source = QgsProcessingParameterFeatureSource(name, item.label, kinds, optional=optional)
+        return _helped(source, item.help + _SELECTION)
+    file = QgsProcessingParameterFile(
+        name,
         item.label,
         QgsProcessingParameterFile.Behavior.File,
         fileFilter=_FILES[OutputKind.LAYOUT],
-        optional=not item.required,
+        optional=optional,
     )
-
-
-_INPUTS: dict[InputKind, Callable[[Input], QgsProcessingParameterDefinition]] = {
-    InputKind.BOUNDARY: _polygons,
-    InputKind.CORNER_POINTS: _points,
-    InputKind.LAYOUT: _layout_file,
-}
-_INPUT_NOTES = {InputKind.BOUNDARY: _SELECTION, InputKind.CORNER_POINTS: _SELECTION}
+    return _helped(file, item.help)
 
 
 def _parameter(field: ParamField) -> QgsProcessingParameterDefinition:

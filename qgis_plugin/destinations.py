@@ -6,12 +6,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
     QgsMapLayer,
     QgsProcessing,
-    QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingOutputLayerDefinition,
     QgsProcessingParameterFeatureSink,
@@ -21,9 +20,12 @@ from qgis.core import (
     QgsVectorLayer,
 )
 
-from qgis_plugin.definitions import SinkName, files, parameter_name, sinks
+from qgis_plugin.definitions import SinkName, files, is_given, parameter_name, sinks
 from urban_processing.algorithms import InputKind, Output, OutputKind
 from urban_processing.paths import file_problems, geopackage_problems, map_problems
+
+if TYPE_CHECKING:
+    from qgis_plugin.algorithm import SpecAlgorithm
 
 _TABLE = re.compile(r"""ogr:dbname='([^']+)'\s+table="([^"]+)\"""")
 """A table of a GeoPackage, as QGIS names a sink into it."""
@@ -47,15 +49,13 @@ class Destinations:
 
     Parameters
     ----------
-    algorithm
-        The algorithm, a `SpecAlgorithm`.
-    parameters, context
+    algorithm, parameters, context
         As QGIS gives them.
     """
 
     def __init__(
         self,
-        algorithm: QgsProcessingAlgorithm,
+        algorithm: SpecAlgorithm,
         parameters: Mapping[str, Any],
         context: QgsProcessingContext,
     ) -> None:
@@ -67,9 +67,7 @@ class Destinations:
     def sinks(self) -> list[SinkName]:
         """The layers that are to be made."""
         return [
-            sink
-            for sink in sinks(self.algorithm.spec)
-            if self.parameters.get(sink.parameter) not in (None, "")
+            sink for sink in sinks(self.algorithm.spec) if is_given(self.parameters, sink.parameter)
         ]
 
     @property
@@ -78,7 +76,7 @@ class Destinations:
         return {
             parameter_name(output.name): (output, self._file(output))
             for output in files(self.algorithm.spec)
-            if self.parameters.get(parameter_name(output.name)) not in (None, "")
+            if is_given(self.parameters, parameter_name(output.name))
         }
 
     def of_kind(self, kind: OutputKind) -> list[Path]:
@@ -139,11 +137,10 @@ class Destinations:
         found = set()
         for item in self.algorithm.spec.inputs:
             name = parameter_name(item.name)
-            value = self.parameters.get(name)
-            if value in (None, ""):
+            if not is_given(self.parameters, name):
                 continue
             if item.kind is InputKind.LAYOUT:
-                found.add(Place(Path(str(value)).resolve()))
+                found.add(Place(Path(str(self.parameters[name])).resolve()))
                 continue
             layer = self.algorithm.parameterAsVectorLayer(self.parameters, name, self.context)
             found |= _places_of(layer)

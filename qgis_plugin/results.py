@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +25,6 @@ from qgis_plugin.styling import ResultGroup
 from urban_processing.layout_file.geopackage import field_values
 from urban_processing.metrics.tables import Table
 from urban_processing.schema import GeometryType, Layer
-
-if TYPE_CHECKING:
-    from qgis_plugin.algorithm import SpecAlgorithm
 
 _TYPES = {
     GeometryType.NONE: QgsWkbTypes.Type.NoGeometry,
@@ -66,7 +62,7 @@ def write_sink(
     group
         Where the layer will stand, and in what style.
     """
-    algorithm: SpecAlgorithm = destinations.algorithm
+    algorithm = destinations.algorithm
     layer, name = sink.layer, sink.parameter
     geometry = _geometry(layer, table)
     several = geometry is not None and shapely.get_num_geometries(geometry).max(initial=0) > 1

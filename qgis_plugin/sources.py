@@ -21,7 +21,7 @@ from qgis.core import (
 )
 
 from qgis_plugin.crs import QgisCrs
-from qgis_plugin.definitions import CRS, input_of, parameter_name
+from qgis_plugin.definitions import CRS, input_of, is_given, parameter_name
 from qgis_plugin.feedback import stop_if_cancelled
 from qgis_plugin.geopackage import OGR
 from urban_processing.algorithms import Input, InputKind
@@ -102,7 +102,7 @@ class Sources:
         name = parameter_name(item.name)
         source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
         if source is None:
-            if item.required or self.parameters.get(name) not in (None, ""):
+            if item.required or is_given(self.parameters, name):
                 raise QgsProcessingException(
                     self.algorithm.invalidSourceError(self.parameters, name)
                 )

@@ -104,7 +104,6 @@ class ResultStyle(QgsProcessingLayerPostProcessorInterface):
 def apply_style(layer: Layer, loaded: QgsVectorLayer) -> None:
     """Give a layer readable names of columns, and the style that the layout file has for it."""
     for column in layer.columns:
-        # not every format keeps the names that the sink was given
         loaded.setFieldAlias(loaded.fields().lookupField(column.name), column.label)
     qml = layer_style(layer, places_only=True)
     if qml is None:
