@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from urban_processing.params.base import Naming, Param, Params
+from urban_processing.params.dimensions import unfit_dimensions
 
 
 class StreetPattern(enum.StrEnum):
@@ -256,7 +257,7 @@ class CogenerateParams(Params):
     ] = 3
 
     def contradictions(self, called: Naming) -> list[str]:
-        """Return what contradicts: the two sizes, and weights that are all zero."""
+        """Return what contradicts: the two sizes, weights that are all zero, dimensions."""
         problems = []
         area, number = called("min_area"), called("parcels")
         if self.min_area is None and self.parcels is None:
@@ -269,12 +270,26 @@ class CogenerateParams(Params):
                 f"{size}, {shape} and {access} are all zero: "
                 "give at least one of them a positive value."
             )
+        for hard, value in (
+            ("hard_frontage", "least_frontage"),
+            ("hard_block_length", "max_block_length"),
+        ):
+            if getattr(self, hard) and getattr(self, value) is None:
+                problems.append(f"{called(hard)} needs a value: give {called(value)} (m).")
+        if self.min_area is not None and self.min_area > 0:
+            problems += unfit_dimensions(
+                called,
+                min_area=self.min_area,
+                width_depth=self.width_depth,
+                least_frontage=self.least_frontage,
+                max_block_length=self.max_block_length,
+            )
         return problems
 
     @property
     def frontage_limit(self) -> float:
         """Least frontage in metres where it is a hard limit, else 0."""
-        return self.least_frontage or 0.0 if self.hard_frontage else 0.0
+        return (self.least_frontage or 0.0) if self.hard_frontage else 0.0
 
     @property
     def rules(self) -> Rules:

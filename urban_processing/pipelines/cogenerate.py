@@ -14,6 +14,7 @@ from urban_processing.land import default_tolerance, first_layout, simplify_site
 from urban_processing.layout import Layout, Step
 from urban_processing.mesh.planar import BoolArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.pipelines.dimensions import check_dimensions, missed_dimensions
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
@@ -164,6 +165,7 @@ def smallest_area(site: Site, params: CogenerateParams) -> float:
 def begin(site: Site, params: CogenerateParams) -> State:
     """The state before the first level: one parcel a part, cut through its holes."""
     min_area = smallest_area(site, params)
+    check_dimensions(params, min_area=min_area)
     tolerance = params.simplify
     if tolerance is None:
         mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
@@ -250,4 +252,5 @@ def finish(state: State, progress: Progress = SILENT) -> Layout:
         min_area = float(layout.mesh.face_area[whole].min(initial=np.inf))
         min_area = min_area if math.isfinite(min_area) else state.min_area
     layout = layout.replace(min_area=min_area)
-    return layout.replace(issues=(*layout.issues, *findings(layout, params)))
+    missed = (*findings(layout, params), *missed_dimensions(layout, params))
+    return layout.replace(issues=(*layout.issues, *missed))

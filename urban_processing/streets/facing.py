@@ -18,7 +18,7 @@ MEAN_OVER_MIN = 1.4
 """Mean area of finished parcels, in smallest areas."""
 
 
-NARROW_COST = float(__import__("os").environ.get("NC","3"))
+NARROW_COST = 3.0
 """Cost of each parcel side of street along a parcel that is too narrow there for the least
 frontage, for a width of nothing; in proportion below."""
 

@@ -272,6 +272,7 @@ def _needs(layout: Layout, usable: BoolArray, least: float) -> FloatArray:
     )
     # the sum of a parcel's chains may miss the sum of its edges by a rounding error
     need = np.minimum(
-        required_frontage(layout.mesh.face_area, least=least) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
+        required_frontage(layout.mesh.face_area, least=least) * (1.0 + 1e-9),
+        possible * (1.0 - 1e-9),
     )
     return np.where(layout.face_locked, 0.0, need)

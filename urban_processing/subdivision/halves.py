@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.fields.rings import ComplexArray
-from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS, STRAIGHT_ANGLE
+from urban_processing.mesh.corners import (
+    IRREGULARITY_WEIGHTS,
+    STRAIGHT_ANGLE,
+    side_irregularity,
+)
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.subdivision.parcels import Boundary
 from urban_processing.subdivision.prospect import (
     prospect_of_area,
     prospect_of_quota,
-    side_irregularity,
 )
 
 OWN_SHARE = 0.2
@@ -157,9 +160,9 @@ def _street_of_sides(
     `t` is where each corner lies on the ring, between the end `t_b` and the beginning `t_a` of
     the cut, along which there is no street.
     """
-    before = boundary.street_between(
-        np.repeat(parcel, 4), np.repeat(t_b, 4), t.ravel()
-    ).reshape(-1, 4)
+    before = boundary.street_between(np.repeat(parcel, 4), np.repeat(t_b, 4), t.ravel()).reshape(
+        -1, 4
+    )
     whole = boundary.street_between(parcel, t_b, t_a)
     after = np.column_stack([before[:, 1:], whole + before[:, 0]])
     return np.asarray(after - before)
@@ -212,9 +215,7 @@ def _turns(z: ComplexArray, n: IntArray) -> FloatArray:
     return np.asarray(np.angle((after - z) * np.conj(z - before)))
 
 
-def _measured(
-    z: ComplexArray, n: IntArray, ideal: Ideal, street: FloatArray | None = None
-) -> Half:
+def _measured(z: ComplexArray, n: IntArray, ideal: Ideal, street: FloatArray | None = None) -> Half:
     """Eq. 1 and the proportions of padded polygons; `street` (C, 4) lies along sides."""
     _, after = _neighbours(z, n)
     valid = np.arange(z.shape[1])[None] < n[:, None]
@@ -225,7 +226,7 @@ def _measured(
     by_side = (np.where(valid, side - mean_side[:, None], 0.0) ** 2).sum(axis=1) / n
     g_angle, g_side = IRREGULARITY_WEIGHTS
     safe = np.where(mean_side > 0, mean_side, 1.0)
-    aspects = (np.zeros(len(z)),)
+    aspects: tuple[FloatArray, ...] = (np.zeros(len(z)),)
     least_width = np.full(len(z), np.inf)
     if z.shape[1] > 3:
         quad = np.flatnonzero((n == 4) & (side[:, :4].min(axis=1) > 0))
@@ -237,7 +238,7 @@ def _measured(
         seen = np.hypot(turned.real, ideal.stretch * turned.imag)
         aspects[0][quad] = (seen[:, 0] + seen[:, 2]) / (seen[:, 1] + seen[:, 3])
     if ideal.width_depth is not None and street is not None:
-        aspects = _by_street_side(aspects[0], street, side[:, :4], ideal.width_depth)
+        aspects = _by_street_side(aspects[0], street, ideal.width_depth)
     return Half(
         irregularity=g_angle * by_angle + g_side * by_side / safe**2,
         by_angle=g_angle * by_angle,
@@ -249,7 +250,7 @@ def _measured(
 
 
 def _by_street_side(
-    aspect: FloatArray, street: FloatArray, side: FloatArray, width_depth: float
+    aspect: FloatArray, street: FloatArray, width_depth: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Width over depth relative to the wanted ratio, as `Half.aspects` has it."""
     quad = aspect > 0

@@ -39,6 +39,10 @@ WANTED_WEIGHT = 2.0
 """Proportions count so many times as much where their ratio is given."""
 
 
+FRONTAGE_WEIGHT = 1.0
+"""Weight of halves without any of the least frontage; in proportion below."""
+
+
 @dataclass(frozen=True, eq=False)
 class ScoredCuts:
     """Candidates after snapping, with their quality; `quality` is -inf where a cut is illegal."""
@@ -90,8 +94,8 @@ def score_cuts(
     )
     wanted = params.access_ratio * np.column_stack([left.mean_side, right.mean_side])
     if params.least_frontage is not None:
-        least = params.least_frontage / boundary.rings.scale[cuts.parcel]
-        wanted = np.maximum(wanted, least[:, None])
+        least = params.least_frontage / boundary.rings.scale[cuts.parcel][:, None]
+        wanted = np.maximum(wanted, least)
     reached = street >= wanted
     w_size, w_shape, w_access = params.weights
     parcel_quota = quota[cuts.parcel]
@@ -114,10 +118,10 @@ def score_cuts(
     )
     quality -= w_size * np.minimum(1.0, QUOTA_WEIGHT * _quota_misfit(area, parcel_quota))
     if params.least_frontage is not None:
-        import os
+        # what has no street yet will have one along its shorter sides, as a rule
         later = np.column_stack([left.least_width, right.least_width])
-        short = np.clip(1.0 - np.where(street > 0, street, later) / least[:, None], 0.0, 1.0)
-        quality -= float(os.environ.get("SW","1")) * short.sum(axis=1)
+        short = 1.0 - np.where(street > 0, street, later) / least
+        quality -= FRONTAGE_WEIGHT * np.clip(short, 0.0, 1.0).sum(axis=1)
     if params.continuity > 0:
         ends = _continues(boundary, cuts.parcel, node_a, cuts.leaving).astype(np.float64)
         ends += _continues(boundary, cuts.parcel, node_b, -cuts.arriving)
@@ -130,6 +134,8 @@ def score_cuts(
     legal = (
         (smaller >= min_share[cuts.parcel] * (1.0 - AREA_ROUNDING)) & (left.n >= 3) & (right.n >= 3)
     )
+    if params.frontage_limit > 0:
+        legal &= _possible_frontage(boundary, cuts.parcel, t_a, t_b, b - a) >= least[:, 0]
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
@@ -139,6 +145,15 @@ def score_cuts(
         t_b,
         quality,
     )
+
+
+def _possible_frontage(
+    boundary: Boundary, parcel: IntArray, t_a: FloatArray, t_b: FloatArray, chord: ComplexArray
+) -> FloatArray:
+    """(C,) length that is or could be street around the half that has less of it."""
+    left = boundary.usable_between(parcel, t_b, t_a)
+    right = boundary.usable_between(parcel, t_a, t_b)
+    return np.asarray(np.minimum(left, right) + np.abs(chord))
 
 
 def _noise(parcel: IntArray, lineage: UintArray, seed: int) -> FloatArray:
