@@ -49,14 +49,14 @@ class Motion:
 def free_motion(layout: Layout) -> Motion:
     """Free inside the land, sliding on straight runs of the rim, fixed elsewhere.
 
-    Vertices of locked parcels stay.
+    Vertices of locked parcels, and of parcels around a hole, stay.
     """
     mesh = layout.mesh
     free = ~mesh.vertex_is_boundary
     slide = _slides(layout)
-    locked = np.flatnonzero((mesh.face != OUTSIDE) & layout.face_locked[mesh.face])
+    stays = layout.face_locked | (mesh.face_n_loops > 1)
     held = np.zeros(mesh.n_vertices, dtype=bool)
-    held[mesh.origin[locked]] = True
+    held[mesh.origin[(mesh.face != OUTSIDE) & stays[mesh.face]]] = True
     free &= ~held
     slides = (slide != 0).any(axis=1) & ~held
     unknown = np.full((mesh.n_vertices, 2), STAYS)

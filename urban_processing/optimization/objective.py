@@ -15,9 +15,9 @@ from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.mesh.straight import go_on_straight, included_angle, pairs_at_nodes
 from urban_processing.optimization.motion import STAYS, Motion
 from urban_processing.optimization.terms import (
+    AreaLimits,
     Closeness,
     Junctions,
-    LeastArea,
     Regularity,
     Smoothness,
     Term,
@@ -29,10 +29,13 @@ AREA_WEIGHT = 300.0
 """Weight of the promise that no parcel falls under the smallest area."""
 
 AREA_MARGIN = 1.02
-"""Parcels are kept this much larger than they must be."""
+"""Parcels are kept this much within their limits."""
 
-NEAR_LEAST = 1.5
-"""Parcels larger than this many smallest areas are not in danger."""
+MOST_AREAS = 2.0
+"""Parcels that could not be cut in two are kept below this many smallest areas."""
+
+NEAR = 1.3
+"""Parcels whose area is farther than this factor from both limits are not in danger."""
 
 LEAST_SPACING = 0.05
 """Shorter distances between vertices count as this many parcel sides in the differences."""
@@ -131,22 +134,24 @@ def build_objective(
         (Energy.CLOSENESS, Closeness(initial)),
     ]
     terms = [WeightedTerm(term, weights[energy], energy) for energy, term in energies]
-    promises = [WeightedTerm(term, AREA_WEIGHT) for term in _least_areas(layout, spacing)]
+    promises = [WeightedTerm(term, AREA_WEIGHT) for term in _area_limits(layout, spacing)]
     return Objective(initial, (*terms, *promises), motion)
 
 
-def _least_areas(layout: Layout, spacing: float) -> list[LeastArea]:
-    """Rings of the parcels that may fall under the smallest area, by number of vertices."""
+def _area_limits(layout: Layout, spacing: float) -> list[AreaLimits]:
+    """Limits of the areas of parcels, by number of vertices; no parcel is beyond its own."""
     mesh = layout.mesh
     half_edges, offsets = mesh.face_rings()
     area, count = mesh.face_area, np.diff(offsets)
-    near = (area < NEAR_LEAST * layout.min_area) & (mesh.face_n_loops == 1)
     least = np.minimum(area, AREA_MARGIN * layout.min_area) / spacing**2
+    most = np.maximum(area, MOST_AREAS / AREA_MARGIN * layout.min_area) / spacing**2
+    in_danger = (area < NEAR * layout.min_area) | (NEAR * area > MOST_AREAS * layout.min_area)
+    in_danger &= mesh.face_n_loops == 1
     out = []
-    for n in np.unique(count[near]).tolist():
-        faces = np.flatnonzero(near & (count == n))
+    for n in np.unique(count[in_danger]).tolist():
+        faces = np.flatnonzero(in_danger & (count == n))
         rings = mesh.origin[half_edges[offsets[faces, None] + np.arange(n)]]
-        out.append(LeastArea(rings, least[faces]))
+        out.append(AreaLimits(rings, least[faces], most[faces]))
     return out
 
 

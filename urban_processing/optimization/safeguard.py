@@ -37,6 +37,9 @@ FADING = 0.25
 """Largest difference of the shares of the movement between neighbouring vertices: without it a
 vertex that is held back makes a kink."""
 
+AREA_ROUNDING = 1e-9
+"""Share of the smallest area by which areas may differ, for the order in which they are summed."""
+
 HALVINGS = 5
 """Number of times that the movement around a face is halved before it is taken back."""
 
@@ -101,7 +104,7 @@ def _fading(mesh: PlanarMesh, share: FloatArray) -> FloatArray:
 
 def _loses(layout: Layout, before: _Faces, after: _Faces, faces: IntArray) -> BoolArray:
     area, frontage = before.area[faces], before.frontage[faces]
-    least = np.minimum(area, layout.min_area)
+    least = np.minimum(area, layout.min_area * (1.0 + AREA_ROUNDING))
     needed = np.minimum(frontage, required_frontage(after.area))
     was = before.irregularity[faces]
     return np.asarray(

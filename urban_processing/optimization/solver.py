@@ -42,27 +42,33 @@ class LeastSquares(Protocol):
 
 
 def minimize(problem: LeastSquares, *, progress: Progress = SILENT) -> FloatArray:
-    """Return the unknowns, from zero on, that make the sum of squares small."""
+    """Return the unknowns, from zero on, that make the sum of squares small.
+
+    The first step is taken whole, since promises that begin to count only where something is
+    at its limit are not seen before it; every other one is shortened until it is a gain.
+    """
     x = np.zeros(problem.size)
     if problem.size == 0:
         return x
     residuals = problem.residuals(x)
+    first_cost = cost = float(residuals @ residuals)
     for i in range(MOST_STEPS):
         progress.update(i / MOST_STEPS, "Smoothing parcels and streets")
         step = _step(problem.jacobian(x), residuals)
-        cost, share = float(residuals @ residuals), 1.0
+        share = 1.0
         while True:
             new = problem.residuals(x + share * step)
             new_cost = float(new @ new)
-            if new_cost < cost:
+            if i == 0 or new_cost < cost or share < SHORTEST_STEP:
                 break
             share /= 2
-            if share < SHORTEST_STEP:
-                return x
-        x, residuals = x + share * step, new
-        if cost - new_cost < SMALL_GAIN * cost:
+        gain = cost - new_cost
+        if i > 0 and gain <= 0:
             break
-    return x
+        x, residuals, cost = x + share * step, new, new_cost
+        if 0 <= gain < SMALL_GAIN * cost:
+            break
+    return x if cost < first_cost else np.zeros(problem.size)
 
 
 def _step(jacobian: sp.csr_array, residuals: FloatArray) -> FloatArray:

@@ -221,22 +221,23 @@ class Closeness:
 
 
 @dataclass(frozen=True, eq=False)
-class LeastArea:
-    """Parcels that would fall under the smallest area: F rings of N vertices.
+class AreaLimits:
+    """Parcels that would become too small or too large: F rings of N vertices.
 
-    No energy of the paper but a soft form of a promise; the residual is what a parcel lacks, 0
-    where it is large enough.
+    No energy of the paper but the soft form of a promise; the residual is what a parcel lacks or
+    has too much, 0 within the limits.
 
     Parameters
     ----------
     rings
         (F, N) vertices in counter-clockwise order.
-    least
-        (F,) area that a parcel is to keep.
+    least, most
+        (F,) limits of the area.
     """
 
     rings: IntArray
     least: FloatArray
+    most: FloatArray
 
     @property
     def vertices(self) -> IntArray:
@@ -244,16 +245,18 @@ class LeastArea:
         return self.rings
 
     def residuals(self, xy: FloatArray) -> FloatArray:
-        """The lack of area as a share of what is to be kept."""
-        return np.asarray(np.maximum(self.least - self._areas(xy), 0.0) / self.least)
+        """Area beyond the limits, as a share of the smaller one."""
+        area = self._areas(xy)
+        return np.asarray((area - np.clip(area, self.least, self.most)) / self.least)
 
     def derivatives(self, xy: FloatArray) -> FloatArray:
-        """The same, differentiated; 0 where a parcel is large enough."""
+        """The same, differentiated; 0 within the limits."""
         points = xy[self.rings]
         chord = np.roll(points, -1, axis=1) - np.roll(points, 1, axis=1)
         by_area = 0.5 * np.stack([chord[..., 1], -chord[..., 0]], axis=-1)
-        lacks = self._areas(xy) < self.least
-        return np.where(lacks[:, None, None], -by_area / self.least[:, None, None], 0.0)
+        area = self._areas(xy)
+        beyond = (area < self.least) | (area > self.most)
+        return np.where(beyond[:, None, None], by_area / self.least[:, None, None], 0.0)
 
     def _areas(self, xy: FloatArray) -> FloatArray:
         points = xy[self.rings] - xy[self.rings[:, :1]]
