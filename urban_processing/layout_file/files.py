@@ -256,6 +256,7 @@ def _read_history(file: _File) -> tuple[Step, ...]:
             version=str(column["version"][i]),
             input_sha256=str(column["input_sha256"][i]),
             seconds=float(column["seconds"][i]),
+            results=json.loads(column["results"][i]),
         )
         for i in np.argsort(column["step"], kind="stable")
     )

@@ -12,14 +12,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
 from urban_processing.metrics.registry import INTERIOR, METRICS
 from urban_processing.streets.block_length import BlockSides, longest_sides
 from urban_processing.streets.network import NodeKind, StreetNetwork, street_network
-
-IRREGULAR = 0.1
-"""Parcels with a larger irregularity are called irregular (Chen 2024, Fig. 17)."""
 
 SMALL_BLOCK = 3
 """Blocks of at most this many parcels count as small."""

@@ -65,6 +65,14 @@ class CogenerateParams(Params):
             },
         ),
     ] = StreetPattern.LOOP
+    optimize: Annotated[
+        bool,
+        Param(
+            label="Optimize the geometry",
+            help="Whether to smooth sides and streets and to make parcels and junctions more "
+            "regular in the end.",
+        ),
+    ] = True
     seed: Annotated[
         int,
         Param(

@@ -13,7 +13,9 @@ from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance, first_layout, simplify_site
 from urban_processing.layout import Layout, Step
 from urban_processing.mesh.planar import BoolArray, IntArray
+from urban_processing.optimization.optimize import optimize_geometry
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines.dimensions import check_dimensions, missed_dimensions
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.quotas import divided, shared_out
@@ -22,6 +24,7 @@ from urban_processing.rebuild import canonical
 from urban_processing.site import Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
+from urban_processing.streets.shorten import divide_long_blocks
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
@@ -37,8 +40,9 @@ FLOOR_SHARE = 0.6
 MOST_PARCELS = 2_000_000
 """More parcels than this are refused: the run would take hours and all the memory."""
 
-LEVELS_SHARE, RECUT_SHARE = 0.65, 0.8
-"""Share of the levels in the time of a run, and of cutting again in the time after them."""
+LEVELS_SHARE, RECUT_SHARE, PRUNED_SHARE = 0.6, 0.6, 0.7
+"""Share of the levels in the time of a run; of cutting again, and of the clean-up of streets, in
+the time after them."""
 
 SECONDS_PER_PARCEL = 1.8e-3
 """For the estimate that is given before a long run; one core of a common machine."""
@@ -128,7 +132,8 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         levels.update(min(done, 1.0) ** 3, _message(state))
         state = step(state)
     levels.update(1.0, _message(state))
-    layout = canonical(finish(state, progress.slice(LEVELS_SHARE, 1.0)))
+    layout, results = finish(state, progress.slice(LEVELS_SHARE, 1.0))
+    layout = canonical(layout)
     progress.update(1.0)
     entry = Step(
         algorithm="cogenerate",
@@ -137,6 +142,7 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         version=__version__,
         input_sha256=site.input_sha256,
         seconds=time.perf_counter() - started,
+        results=results,
     )
     return layout.replace(history=(*layout.history, entry))
 
@@ -233,8 +239,14 @@ def _levels_left(state: State) -> int:
     return max(1, math.ceil(math.log2(largest / (MEAN_OVER_MIN * state.min_area))))
 
 
-def finish(state: State, progress: Progress = SILENT) -> Layout:
-    """Cut irregular parcels again, clean up the streets, list what the user should know."""
+def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str, float]]:
+    """Cut irregular parcels again, clean up the streets, optimize, list what is to be known.
+
+    Returns
+    -------
+    layout, results
+        The layout, and what the optimization gained.
+    """
     params = state.params
     layout = state.layout
     if params.rules.recut:
@@ -246,11 +258,25 @@ def finish(state: State, progress: Progress = SILENT) -> Layout:
         )
     progress.update(RECUT_SHARE, "Cleaning up the streets")
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
-    min_area = state.min_area
-    if state.quota is not None:
-        whole = layout.mesh.face_area >= min_area
-        min_area = float(layout.mesh.face_area[whole].min(initial=np.inf))
-        min_area = min_area if math.isfinite(min_area) else state.min_area
-    layout = layout.replace(min_area=min_area)
+    layout = layout.replace(min_area=_promised_area(state, layout))
+    results: dict[str, float] = {}
+    if params.optimize:
+        optimized = optimize_geometry(
+            layout,
+            OptimizeParams().weights,
+            least_frontage=params.least_frontage or 0.0,
+            progress=progress.slice(PRUNED_SHARE, 1.0),
+        )
+        layout, results = optimized.layout, optimized.results()
+        # what has moved may have become a little longer than wanted
+        layout = divide_long_blocks(layout, params)
     missed = (*findings(layout, params), *missed_dimensions(layout, params))
-    return layout.replace(issues=(*layout.issues, *missed))
+    return layout.replace(issues=(*layout.issues, *missed)), results
+
+
+def _promised_area(state: State, layout: Layout) -> float:
+    """Smallest area in m² that the layout promises: given, or that of its smallest parcel."""
+    if state.quota is None:
+        return state.min_area
+    whole = layout.mesh.face_area >= state.min_area
+    return float(layout.mesh.face_area[whole].min()) if whole.any() else state.min_area

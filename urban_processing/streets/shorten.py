@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from urban_processing.layout import Layout
 from urban_processing.mesh.planar import IntArray
 from urban_processing.params import CogenerateParams
 from urban_processing.streets.block_length import longest_sides
@@ -70,6 +71,15 @@ class BlockLimit:
             set(np.flatnonzero(block == b).tolist())
             for b in np.flatnonzero(length > self.limit + MEASURED_M).tolist()
         ]
+
+
+def divide_long_blocks(layout: Layout, params: CogenerateParams) -> Layout:
+    """Lay streets across the blocks of a finished layout that are longer than wanted."""
+    if params.max_block_length is None:
+        return layout
+    state = StreetState(layout, params)
+    shorten_blocks(state, BlockLimit(state, params))
+    return state.finish(level=int(layout.edge_level.max(initial=0)))
 
 
 def shorten_blocks(state: StreetState, limit: BlockLimit) -> None:

@@ -23,11 +23,9 @@ from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.streamline import propose_cuts
 
-IRREGULAR = 0.1
-"""Parcels above this irregularity, and triangles, are cut again."""
-
 SIDES_COST = 0.05
-"""Cost, in irregularity, of a parcel that has not four sides."""
+"""Cost, in irregularity, of a parcel that has not four sides; parcels of at least this cost are
+cut again."""
 
 SHORT_COST = 0.5
 """Cost, in irregularity, of a parcel without any of the least frontage; in proportion below."""
@@ -108,7 +106,7 @@ def _choose_pairs(
     pairs = []
     single = layout.mesh.face_n_loops == 1
     for face in np.argsort(-np.round(cost, 9), kind="stable").tolist():
-        if cost[face] < min(IRREGULAR, SIDES_COST):
+        if cost[face] < SIDES_COST:
             break
         for i in by_face.get(face, []) if face not in taken and single[face] else []:
             other = int(right[i]) if left[i] == face else int(left[i])
