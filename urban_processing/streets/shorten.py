@@ -14,8 +14,11 @@ from urban_processing.params import CogenerateParams
 from urban_processing.streets.block_length import longest_sides
 from urban_processing.streets.blocks import flood_block, layout_cost
 from urban_processing.streets.paths import find_paths, join_cost
-from urban_processing.streets.split import SMALLEST_HALF, entries
+from urban_processing.streets.split import entries
 from urban_processing.streets.state import StreetState
+
+SMALLEST_HALF = 4
+"""Number of parcels that both halves of a divided block have at least; three make a small one."""
 
 MEASURED_M = 1e-6
 """Precision in metres of a measured length."""
