@@ -36,7 +36,8 @@ def longest_sides(polygons: npt.NDArray[np.object_], block: IntArray) -> BlockSi
 
     The outline of a block is that of its parcels together. Its corners are those of the
     approximate polygon, bends of 45° and more, in which a long curve may end up as well; a
-    street that ends at the block from outside makes no corner. Streets that end inside a block (cul-de-sacs) do not divide it.
+    street that ends at the block from outside makes no corner. Streets that end inside a block
+    (cul-de-sacs) do not divide it.
 
     Parameters
     ----------
