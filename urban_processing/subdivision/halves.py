@@ -19,11 +19,12 @@ from urban_processing.subdivision.prospect import (
     prospect_of_quota,
 )
 
-OWN_SHARE = 0.2
-"""Weight of the present proportions of a half that is still to be cut."""
+OWN_SHARE, WANTED_OWN_SHARE = 0.2, 0.05
+"""Weight of the present proportions of a half that is still to be cut; the second where a ratio of
+width and depth is wanted."""
 
 
-OPEN_SHARE = 0.3
+OPEN_SHARE = 0.8
 """The street side of a half is open while two adjacent sides have street, the shorter one at
 least this share of the longer one."""
 
@@ -85,7 +86,10 @@ class Half:
     def with_prospect(self, content: FloatArray, quota: IntArray, weight: float) -> FloatArray:
         """Irregularity with what later cuts can make of the half in place of its proportions."""
         uncut = np.where(quota > 0, quota < 2, content < 2.0)
-        later = np.min([_later(_folded(a), content, quota) for a in self.aspects[:2]], axis=0)
+        own_share = OWN_SHARE if len(self.aspects) == 1 else WANTED_OWN_SHARE
+        later = np.min(
+            [_later(_folded(a), content, quota, own_share) for a in self.aspects[:2]], axis=0
+        )
         own = side_irregularity(_folded(self.aspects[-1]))
         shown = np.where(uncut, own, later)
         return np.asarray(
@@ -98,14 +102,16 @@ def _folded(aspect: FloatArray) -> FloatArray:
     return np.asarray(np.exp(np.abs(np.log(np.where(aspect > 0, aspect, 1.0)))))
 
 
-def _later(folded: FloatArray, content: FloatArray, quota: IntArray) -> FloatArray:
+def _later(
+    folded: FloatArray, content: FloatArray, quota: IntArray, own_share: float
+) -> FloatArray:
     """Deviation from ideal proportions of the parcels that later cuts can make, and its own."""
     later = np.where(
         quota > 0,
         prospect_of_quota(folded, quota),
         prospect_of_area(folded, np.maximum(content, 1.0)),
     )
-    return np.asarray(later + OWN_SHARE * side_irregularity(folded))
+    return np.asarray(later + own_share * side_irregularity(folded))
 
 
 def half_polygons(
