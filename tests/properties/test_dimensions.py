@@ -62,8 +62,8 @@ def plain(name: str) -> Layout:
     return run(LANDS[name])
 
 
-@pytest.mark.parametrize("wanted", [0.5, 1.5])
-def test_width_to_depth_comes_nearer_to_what_is_wanted(wanted: float) -> None:
+@pytest.mark.parametrize(("wanted", "gain"), [(0.5, 0.25), (1.5, 0.03)])
+def test_width_to_depth_comes_nearer_to_what_is_wanted(wanted: float, gain: float) -> None:
     gained = []
     for name in MANY:
         before, after = (
@@ -72,8 +72,8 @@ def test_width_to_depth_comes_nearer_to_what_is_wanted(wanted: float) -> None:
         )
         # that of the median, and the median of all
         gained.append((before[0] - after[0], np.median(before[1:]) - np.median(after[1:])))
-    assert np.mean(gained, axis=0) == pytest.approx([0.3, 0.3], abs=0.28)
-    assert (np.array(gained) > 0).mean() >= 0.8
+    assert (np.mean(gained, axis=0) > gain).all()
+    assert np.min(gained) > -0.05
 
 
 def test_parcels_in_the_middle_of_blocks_are_near_the_wanted_ratio() -> None:
@@ -173,11 +173,13 @@ def test_place_and_rotation_do_not_matter() -> None:
     for turn, shift in ((0, 0), (33, 0), (200, -3e5)):
         land = shapely.affinity.rotate(LANDS["star"], turn, origin=(0, 0))
         land = shapely.affinity.translate(land, shift, 2 * shift)
-        layout = run(land, simplify=0, **DIMENSIONS)
+        layout = run(land, simplify=0, width_depth=0.5, max_block_length=250)
         must_hold(layout)
-        found.append((layout.mesh.n_faces, float(np.median(ratios(layout)))))
+        off = np.log(ratios(layout) / 0.5)
+        found.append((layout.mesh.n_faces, float(np.exp(off.mean())), block_lengths(layout).max()))
+    # the grid of coordinates and ties aside, the layouts are the same
     for other in found[1:]:
-        assert other == pytest.approx(found[0], rel=0.12)
+        assert other == pytest.approx(found[0], rel=0.15)
 
 
 @settings(
