@@ -10,7 +10,7 @@ from urban_processing.mesh.corners import side_irregularity
 from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray, PlanarMesh
 from urban_processing.params import CogenerateParams
 
-FACING_COST = 100.0
+FACING_COST = 40.0
 """Cost of each parcel side of street along a parcel, for each unit of irregularity that its
 proportions have relative to the wanted ones if it fronts there."""
 
