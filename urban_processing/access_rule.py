@@ -19,18 +19,21 @@ ACCESS_SHARE = 0.25
 """Frontage that street generation gives every parcel, as a share of the square root of its area."""
 
 
-def required_frontage(area: npt.ArrayLike) -> FloatArray:
+def required_frontage(area: npt.ArrayLike, *, least: float = 0.0) -> FloatArray:
     """Return the frontage in metres from which parcels of `area` (m²) count as reached.
 
     It is never less than the published definition of a reached parcel,
-    ``min(3 m, 0.25 * sqrt(area))``, so that what is reached here is reached there.
+    ``min(3 m, 0.25 * sqrt(area))``, so that what is reached here is reached there, and never
+    less than the `least` frontage (m) that was set as a hard limit.
     """
-    return np.asarray(ACCESS_SHARE * np.sqrt(np.asarray(area, dtype=np.float64)))
+    by_area = ACCESS_SHARE * np.sqrt(np.asarray(area, dtype=np.float64))
+    return np.asarray(np.maximum(by_area, least))
 
 
-def is_reached(frontage: npt.ArrayLike, area: npt.ArrayLike) -> BoolArray:
+def is_reached(frontage: npt.ArrayLike, area: npt.ArrayLike, *, least: float = 0.0) -> BoolArray:
     """Return whether parcels with `frontage` (m) on streets and `area` (m²) are reached."""
-    return np.asarray(np.asarray(frontage, dtype=np.float64) >= required_frontage(area))
+    found = np.asarray(frontage, dtype=np.float64)
+    return np.asarray(found >= required_frontage(area, least=least))
 
 
 def reached_frontage(area: npt.ArrayLike) -> FloatArray:

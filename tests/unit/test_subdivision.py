@@ -9,6 +9,7 @@ from lands import LANDS, holed, site_of
 
 from urban_processing.land import first_layout, simplify_site
 from urban_processing.layout import Layout
+from urban_processing.mesh.corners import side_irregularity
 from urban_processing.params import CogenerateParams
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
@@ -16,7 +17,6 @@ from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.prospect import (
     prospect_of_area,
     prospect_of_quota,
-    side_irregularity,
 )
 from urban_processing.subdivision.short_edges import remove_short_edges
 from urban_processing.subdivision.streamline import propose_cuts

@@ -66,6 +66,11 @@ def polygon_irregularity(
     return np.asarray(gamma[0] * by_angle + gamma[1] * by_side)
 
 
+def side_irregularity(aspect: FloatArray) -> FloatArray:
+    """Second term of Eq. 1 for rectangles, from their long over short side."""
+    return np.asarray(IRREGULARITY_WEIGHTS[1] * ((aspect - 1.0) / (aspect + 1.0)) ** 2)
+
+
 def mean_side_length(xy: FloatArray, offsets: IntArray) -> FloatArray:
     """Mean side length of each polygon in metres."""
     _, after = ring_neighbours(offsets)

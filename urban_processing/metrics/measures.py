@@ -16,6 +16,7 @@ from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
 from urban_processing.metrics.registry import INTERIOR, METRICS
+from urban_processing.streets.block_length import BlockSides, longest_sides
 from urban_processing.streets.network import NodeKind, StreetNetwork, street_network
 
 SMALL_BLOCK = 3
@@ -66,6 +67,11 @@ class LayoutMeasures:
             connected_components(coo_array((ones, (a, b)), shape=(n, n)), directed=False)[1],
             dtype=np.int64,
         )
+
+    @cached_property
+    def block_sides(self) -> BlockSides:
+        """The blocks' outlines, lengths and longest sides."""
+        return longest_sides(self.layout.mesh.face_polygons(), self.parcel_block)
 
 
 def measure(layout: Layout, *, measures: LayoutMeasures | None = None) -> tuple[Metric, ...]:
@@ -150,6 +156,7 @@ def _parcel_values(known: LayoutMeasures, chosen: BoolArray) -> dict[str, float]
         "unreached": int((~p.reached[chosen]).sum()),
         "frontage_mean_m": _mean(frontage),
         "frontage_min_m": _lowest(frontage),
+        **_proportions(p, chosen),
         "thinness_mean": _mean(thinness),
         "thinness_min": _lowest(thinness),
         "p_angle_deg": _mean(np.abs(p.corner_angle[corner_chosen] - 90.0)),
@@ -163,6 +170,18 @@ def _parcel_values(known: LayoutMeasures, chosen: BoolArray) -> dict[str, float]
         "area_max_over_min_area": _highest(area) / smallest,
         "above_2_min_area_pct": _percent(area > 2.0 * smallest),
         "above_3_min_area": int((area > 3.0 * smallest).sum()),
+    }
+
+
+def _proportions(p: ParcelMeasures, chosen: BoolArray) -> dict[str, float]:
+    """Width over depth of the parcels that have frontage."""
+    ratio = (p.width / p.depth)[chosen]
+    ratio = ratio[np.isfinite(ratio)]
+    low, middle, high = np.quantile(ratio, (0.1, 0.5, 0.9)) if len(ratio) else [math.nan] * 3
+    return {
+        "width_depth_median": float(middle),
+        "width_depth_p10": float(low),
+        "width_depth_p90": float(high),
     }
 
 
@@ -210,11 +229,14 @@ def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -
 
 
 def _block_values(known: LayoutMeasures, inside: BoolArray) -> dict[str, float]:
-    _, size = np.unique(known.parcel_block[inside], return_counts=True)
+    block, size = np.unique(known.parcel_block[inside], return_counts=True)
+    length = known.block_sides.length[block]
     return {
         "blocks": len(size),
         "block_parcels_median": float(np.median(size)),
         "block_parcels_max": int(size.max()),
+        "block_length_median_m": float(np.median(length)),
+        "block_length_max_m": _highest(length),
         "small_blocks_pct": _percent(size <= SMALL_BLOCK),
     }
 

@@ -104,7 +104,7 @@ def measure_parcels(layout: Layout) -> ParcelMeasures:
     sides = np.diff(corner_offsets)
     on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
     side_frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
-    width, depth = _width_and_depth(xy, offsets, corner_xy, corner_offsets, side_frontage)
+    width, depth = _extents(xy, offsets, corner_xy, corner_offsets, side_frontage)
     area, polygons = mesh.face_area, mesh.face_polygons()
     enough = reached_frontage(area)
     return ParcelMeasures(
@@ -125,6 +125,17 @@ def measure_parcels(layout: Layout) -> ParcelMeasures:
         reached=layout.frontage >= enough,
         through=_through_lots(corner_xy, corner_offsets, side_frontage, enough),
     )
+
+
+def width_and_depth(layout: Layout) -> tuple[FloatArray, FloatArray]:
+    """Width and depth of every parcel, as `ParcelMeasures` has them, without the rest of it."""
+    mesh = layout.mesh
+    half_edges, offsets = mesh.face_rings()
+    xy = mesh.xy[mesh.origin[half_edges]]
+    corners, corner_offsets = reported_polygons(xy, offsets)
+    on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
+    side_frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
+    return _extents(xy, offsets, xy[corners], corner_offsets, side_frontage)
 
 
 def inscribed_thinness(polygons: npt.NDArray[np.object_], area: FloatArray) -> FloatArray:
@@ -151,7 +162,7 @@ def _frontage_of_sides(
     return np.asarray(length, dtype=np.float64)
 
 
-def _width_and_depth(
+def _extents(
     xy: FloatArray,
     offsets: IntArray,
     corner_xy: FloatArray,

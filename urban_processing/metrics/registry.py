@@ -86,6 +86,11 @@ METRICS: tuple[MetricSpec, ...] = (
     _parcels("unreached", "", "", "Parcels with less frontage than min(3 m, 0.25 √area)."),
     _parcels("frontage_mean_m", "m", "", "Mean length of a parcel's boundary on streets."),
     _parcels("frontage_min_m", "m", "", "Smallest length of a parcel's boundary on streets."),
+    _parcels(
+        "width_depth_median", "", "", "Median of width along the street over depth of a parcel."
+    ),
+    _parcels("width_depth_p10", "", "", "Width over depth that a tenth of the parcels is below."),
+    _parcels("width_depth_p90", "", "", "Width over depth that a tenth of the parcels is above."),
     _parcels("thinness_mean", "", "", "Mean diameter of the largest inscribed circle over √area."),
     _parcels("thinness_min", "", "", "Smallest such ratio of a parcel: slivers show here."),
     _parcels(
@@ -125,6 +130,13 @@ METRICS: tuple[MetricSpec, ...] = (
     MetricSpec("blocks", "", "", "Faces of the street network, rim included."),
     MetricSpec("block_parcels_median", "", "", "Median number of parcels of a block."),
     MetricSpec("block_parcels_max", "", "", "Largest number of parcels of a block."),
+    MetricSpec("block_length_median_m", "m", "", "Median length of a block: of its longest side."),
+    MetricSpec(
+        "block_length_max_m",
+        "m",
+        "",
+        "Largest length of a block: of its longest side, from corner to corner along the boundary.",
+    ),
     MetricSpec("small_blocks_pct", "%", "", "Share of blocks of three parcels or fewer."),
 )
 """All metrics, in the order in which tables list them."""

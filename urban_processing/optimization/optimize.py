@@ -58,7 +58,11 @@ class Optimized:
 
 
 def optimize_geometry(
-    layout: Layout, weights: Mapping[Energy, float], *, progress: Progress = SILENT
+    layout: Layout,
+    weights: Mapping[Energy, float],
+    *,
+    least_frontage: float = 0.0,
+    progress: Progress = SILENT,
 ) -> Optimized:
     """Make parcels more regular, sides and streets smoother, junctions more right-angled.
 
@@ -74,6 +78,8 @@ def optimize_geometry(
         The layout.
     weights
         ω1 to ω5.
+    least_frontage
+        Frontage in metres below which no parcel falls that has it before.
     progress
         Told how far the work is; may cancel it.
     """
@@ -88,7 +94,9 @@ def optimize_geometry(
     best = layout
     for i, share in enumerate(SHORTENINGS):
         progress.update(SOLVING + (1.0 - SOLVING) * i / len(SHORTENINGS), "Checking every parcel")
-        moved = moved_to(layout, safe_positions(layout, mesh.xy + share * wanted))
+        moved = moved_to(
+            layout, safe_positions(layout, mesh.xy + share * wanted, least_frontage=least_frontage)
+        )
         if _no_worse(moved, street_network(moved), layout, network):
             best = moved
             break

@@ -56,7 +56,9 @@ class _Faces:
     infinite irregularity."""
 
 
-def safe_positions(layout: Layout, wanted: FloatArray) -> FloatArray:
+def safe_positions(
+    layout: Layout, wanted: FloatArray, *, least_frontage: float = 0.0
+) -> FloatArray:
     """Return positions as near to the wanted ones as every face allows.
 
     Parameters
@@ -65,6 +67,8 @@ def safe_positions(layout: Layout, wanted: FloatArray) -> FloatArray:
         The layout before.
     wanted
         (V, 2) local coordinates; vertices of the rim keep its shape.
+    least_frontage
+        Frontage in metres below which no parcel falls that has it before.
 
     Returns
     -------
@@ -83,7 +87,7 @@ def safe_positions(layout: Layout, wanted: FloatArray) -> FloatArray:
     while True:
         xy = np.where(share[:, None] > 0, snap_to_grid(mesh.xy + share[:, None] * shift), mesh.xy)
         after = rings.measure(xy, suspects)
-        bad = suspects[_loses(layout, before, after, suspects)]
+        bad = suspects[_loses(layout, before, after, suspects, least_frontage)]
         if len(bad) == 0:
             return xy
         at = rings.vertices_of(bad)
@@ -102,10 +106,12 @@ def _fading(mesh: PlanarMesh, share: FloatArray) -> FloatArray:
     return out
 
 
-def _loses(layout: Layout, before: _Faces, after: _Faces, faces: IntArray) -> BoolArray:
+def _loses(
+    layout: Layout, before: _Faces, after: _Faces, faces: IntArray, least_frontage: float
+) -> BoolArray:
     area, frontage = before.area[faces], before.frontage[faces]
     least = np.minimum(area, layout.min_area * (1.0 + AREA_ROUNDING))
-    needed = np.minimum(frontage, required_frontage(after.area))
+    needed = np.minimum(frontage, required_frontage(after.area, least=least_frontage))
     was = before.irregularity[faces]
     return np.asarray(
         (before.sound[faces] & ~after.sound)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from urban_processing.params.base import Naming, Param, Params
+from urban_processing.params.dimensions import unfit_dimensions
 
 
 class StreetPattern(enum.StrEnum):
@@ -24,7 +25,7 @@ class Preset(enum.StrEnum):
     CHEN2024 = "chen2024"
 
 
-_SIZE, _SHAPE, _STREETS = "Size", "Parcel shape", "Streets"
+_SIZE, _SHAPE, _STREETS, _DIMENSIONS = "Size", "Parcel shape", "Streets", "Dimensions"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,6 +102,56 @@ class CogenerateParams(Params):
             group=_SHAPE,
         ),
     ] = None
+    width_depth: Annotated[
+        float | None,
+        Param(
+            label="Width : depth of parcels",
+            help="Width of parcels along their street over their depth: with 0.5, parcels half as "
+            "wide as deep are aimed at.",
+            minimum=0.1,
+            maximum=10,
+            group=_DIMENSIONS,
+        ),
+    ] = None
+    least_frontage: Annotated[
+        float | None,
+        Param(
+            label="Least frontage",
+            help="Length of street that every parcel is to have along its boundary.",
+            unit="m",
+            above=0,
+            group=_DIMENSIONS,
+        ),
+    ] = None
+    hard_frontage: Annotated[
+        bool,
+        Param(
+            label="Least frontage is a hard limit",
+            help="Whether the least frontage is a hard limit: streets are added for it, and each "
+            "parcel that stays below is listed.",
+            group=_DIMENSIONS,
+        ),
+    ] = False
+    max_block_length: Annotated[
+        float | None,
+        Param(
+            label="Longest block",
+            help="Length that no block is to have on any of its sides, from corner to corner; "
+            "longer blocks get a street across.",
+            unit="m",
+            above=0,
+            group=_DIMENSIONS,
+        ),
+    ] = None
+    hard_block_length: Annotated[
+        bool,
+        Param(
+            label="Longest block is a hard limit",
+            help="Whether the longest block is a hard limit: blocks are split even where that "
+            "leaves very small ones, and each that stays longer is listed.",
+            group=_DIMENSIONS,
+        ),
+    ] = False
     preset: Annotated[
         Preset,
         Param(
@@ -214,7 +265,7 @@ class CogenerateParams(Params):
     ] = 3
 
     def contradictions(self, called: Naming) -> list[str]:
-        """Return what contradicts: the two sizes, and weights that are all zero."""
+        """Return what contradicts: the two sizes, weights that are all zero, dimensions."""
         problems = []
         area, number = called("min_area"), called("parcels")
         if self.min_area is None and self.parcels is None:
@@ -227,7 +278,26 @@ class CogenerateParams(Params):
                 f"{size}, {shape} and {access} are all zero: "
                 "give at least one of them a positive value."
             )
+        for hard, value in (
+            ("hard_frontage", "least_frontage"),
+            ("hard_block_length", "max_block_length"),
+        ):
+            if getattr(self, hard) and getattr(self, value) is None:
+                problems.append(f"{called(hard)} needs a value: give {called(value)} (m).")
+        if self.min_area is not None and self.min_area > 0:
+            problems += unfit_dimensions(
+                called,
+                min_area=self.min_area,
+                width_depth=self.width_depth,
+                least_frontage=self.least_frontage,
+                max_block_length=self.max_block_length,
+            )
         return problems
+
+    @property
+    def frontage_limit(self) -> float:
+        """Least frontage in metres where it is a hard limit, else 0."""
+        return (self.least_frontage or 0.0) if self.hard_frontage else 0.0
 
     @property
     def rules(self) -> Rules:

@@ -16,6 +16,7 @@ from urban_processing.mesh.planar import BoolArray, IntArray
 from urban_processing.optimization.optimize import optimize_geometry
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.pipelines.dimensions import check_dimensions, missed_dimensions
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
@@ -23,6 +24,7 @@ from urban_processing.rebuild import canonical
 from urban_processing.site import Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
+from urban_processing.streets.shorten import divide_long_blocks
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
@@ -169,6 +171,7 @@ def smallest_area(site: Site, params: CogenerateParams) -> float:
 def begin(site: Site, params: CogenerateParams) -> State:
     """The state before the first level: one parcel a part, cut through its holes."""
     min_area = smallest_area(site, params)
+    check_dimensions(params, min_area=min_area)
     tolerance = params.simplify
     if tolerance is None:
         mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
@@ -259,10 +262,16 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
     results: dict[str, float] = {}
     if params.optimize:
         optimized = optimize_geometry(
-            layout, OptimizeParams().weights, progress=progress.slice(PRUNED_SHARE, 1.0)
+            layout,
+            OptimizeParams().weights,
+            least_frontage=params.least_frontage or 0.0,
+            progress=progress.slice(PRUNED_SHARE, 1.0),
         )
         layout, results = optimized.layout, optimized.results()
-    return layout.replace(issues=(*layout.issues, *findings(layout, params))), results
+        # what has moved may have become a little longer than wanted
+        layout = divide_long_blocks(layout, params)
+    missed = (*findings(layout, params), *missed_dimensions(layout, params))
+    return layout.replace(issues=(*layout.issues, *missed)), results
 
 
 def _promised_area(state: State, layout: Layout) -> float:

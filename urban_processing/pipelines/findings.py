@@ -48,7 +48,7 @@ def _count(layout: Layout, params: CogenerateParams) -> list[Issue]:
     ]
 
 
-def _of_parcels(
+def parcel_issues(
     layout: Layout,
     code: str,
     message: str,
@@ -80,7 +80,7 @@ def _sizes(layout: Layout) -> list[Issue]:
     area = layout.mesh.face_area
     least = np.full(len(area), layout.min_area)
     most = VERY_LARGE * least
-    return _of_parcels(
+    return parcel_issues(
         layout,
         "part_below_min_area",
         "This part of the land ({value:.0f} m²) is smaller than the smallest parcel allowed "
@@ -88,7 +88,7 @@ def _sizes(layout: Layout) -> list[Issue]:
         area < least * (1.0 - AREA_ROUNDING),
         area,
         least,
-    ) + _of_parcels(
+    ) + parcel_issues(
         layout,
         "parcel_not_cut",
         "No cut of this parcel ({value:.0f} m²) leaves two simple halves that are large enough; "
@@ -104,7 +104,7 @@ def _unreached(layout: Layout) -> list[Issue]:
     needed = reached_frontage(layout.mesh.face_area)
     unreached = np.zeros(len(needed), dtype=bool)
     unreached[unreached_parcels_of(layout)] = True
-    return _of_parcels(
+    return parcel_issues(
         layout,
         "parcel_not_reached",
         "No street can reach this parcel without running along a rim that is no street: its "

@@ -25,11 +25,14 @@ OPPOSITE = 0.3
 
 
 def layout_cost(state: StreetState, chains: Sequence[int]) -> float:
-    """Cost of the blocks and through lots that the new street `chains` make."""
+    """Cost of the blocks, through lots and parcels' fronts that the new street `chains` make."""
+    facing = 0.0
+    if state.facing is not None:
+        facing = sum(state.facing[i] + state.facing[i ^ 1] for i in chains)
     if state.rules.small_block == 0.0:
-        return 0.0
+        return facing
     small = quantised(state.rules.small_block) * small_block_deficit(state, chains)
-    return small + quantised(THROUGH_COST * through_length(state, chains))
+    return facing + small + quantised(THROUGH_COST * through_length(state, chains))
 
 
 def small_block_deficit(state: StreetState, chains: Sequence[int]) -> int:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams
-from urban_processing.streets.blocks import LARGEST_BLOCK
+from urban_processing.streets.blocks import LARGEST_BLOCK, flood_block
 from urban_processing.streets.ends import close_ends, is_spare, prune_tails
 from urban_processing.streets.links import link_cost, stands_free, street_links
 from urban_processing.streets.settle import settle_ends
+from urban_processing.streets.shorten import BlockLimit, shorten_blocks
 from urban_processing.streets.state import StreetState
 
 
@@ -15,15 +16,16 @@ def prune_streets(layout: Layout, params: CogenerateParams, *, keep_ends: bool) 
     """Take back redundant dead ends and links of the street network, for good.
 
     A street goes where all parcels stay reached, the network stays connected, no block of
-    more than `LARGEST_BLOCK` parcels arises, and, unless `keep_ends`, no dead end. Where a dead
-    end has no other way on it is led along a hole, such as the shore of a lake.
+    more than `LARGEST_BLOCK` parcels or longer than wanted arises, and, unless `keep_ends`, no
+    dead end. Where a dead end has no other way on it is led along a hole, such as the shore of a
+    lake. Blocks that are longer than wanted get streets across before.
 
     Parameters
     ----------
     layout
         A layout whose parcels are final.
     params
-        Weights of street length and junctions.
+        Weights of street length and junctions, and the longest block that is wanted.
     keep_ends
         Whether dead ends are wanted.
     """
@@ -32,11 +34,13 @@ def prune_streets(layout: Layout, params: CogenerateParams, *, keep_ends: bool) 
     if not keep_ends:
         close_ends(state)
         settle_ends(state, along_holes=True)
-    prune_links(state)
+    limit = BlockLimit(state, params)
+    shorten_blocks(state, limit)
+    prune_links(state, limit)
     return state.finish(level=int(layout.edge_level.max(initial=0)))
 
 
-def prune_links(state: StreetState) -> None:
+def prune_links(state: StreetState, limit: BlockLimit) -> None:
     """Take back street links between two blocks that may become one.
 
     A link with the same region on both sides is a bridge of the network and stays; taking
@@ -55,6 +59,8 @@ def prune_links(state: StreetState) -> None:
             if regions.same(left, right) or blocks.members(left, right) > LARGEST_BLOCK:
                 continue
             if not stands_free(state, link) or not is_spare(state, link):
+                continue
+            if not limit.allows(flood_block(state, left) | flood_block(state, right)):
                 continue
             for i in link:
                 state.remove(i)

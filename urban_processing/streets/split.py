@@ -42,7 +42,7 @@ def split_blocks(state: StreetState) -> None:
 def _best_split(state: StreetState, block: set[int]) -> list[int] | None:
     best: list[int] | None = None
     best_cost = math.inf
-    for first in _entries(state, block):
+    for first in entries(state, block):
         start = state.start[first]
         paths = find_paths(
             state,
@@ -58,7 +58,7 @@ def _best_split(state: StreetState, block: set[int]) -> list[int] | None:
     return best
 
 
-def _entries(state: StreetState, block: set[int]) -> list[int]:
+def entries(state: StreetState, block: set[int]) -> list[int]:
     """Chains that lead from the streets around a block into it."""
     entries = set()
     for f in block:

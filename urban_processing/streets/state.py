@@ -15,6 +15,7 @@ from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.corner_graph import CornerGraph
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.params import CogenerateParams
+from urban_processing.streets.facing import facing_cost
 
 STRAIGHT = math.radians(45.0)
 """Two chains are collinear while the turn between them is less, that is, while their included
@@ -68,7 +69,7 @@ class StreetState:
         streets = np.flatnonzero(layout.chain_street)
         self.degree: list[int] = np.bincount(graph.start[streets], minlength=graph.n_nodes).tolist()
         self.frontage: list[float] = layout.frontage.tolist()
-        self.need: list[float] = _needs(layout, usable).tolist()
+        self.need: list[float] = _needs(layout, usable, params.frontage_limit).tolist()
         self.part: list[int] = layout.face_part.tolist()
         self.journal: list[int] = []
         self.part_has_streets: list[bool] = _parts_with_streets(layout)
@@ -78,6 +79,10 @@ class StreetState:
         chord = np.where(a == b, graph.leaving, b - a)
         self.chord: list[complex] = (chord / np.abs(chord)).tolist()
         self.middle: list[complex] = (0.5 * (a + b)).tolist()
+        facing = facing_cost(layout, params, side=self.side)
+        self.facing: list[float] | None = (
+            None if facing is None else (np.round(facing / QUANTUM) * QUANTUM).tolist()
+        )
 
     def add(self, chain: int) -> None:
         """Make a chain street."""
@@ -258,7 +263,7 @@ def _parts_with_street_rim(layout: Layout) -> list[bool]:
     return has.tolist()
 
 
-def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
+def _needs(layout: Layout, usable: BoolArray, least: float) -> FloatArray:
     """(F,) frontage each parcel needs: by the rule, but no more than it can have."""
     graph = layout.corner_graph
     inside = usable & (graph.face != OUTSIDE)
@@ -267,6 +272,7 @@ def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
     )
     # the sum of a parcel's chains may miss the sum of its edges by a rounding error
     need = np.minimum(
-        required_frontage(layout.mesh.face_area) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
+        required_frontage(layout.mesh.face_area, least=least) * (1.0 + 1e-9),
+        possible * (1.0 - 1e-9),
     )
     return np.where(layout.face_locked, 0.0, need)

@@ -9,7 +9,7 @@ import numpy as np
 
 from urban_processing.fields.rings import ComplexArray, RingBatch, cross, make_batch, pad
 from urban_processing.hashing import UintArray
-from urban_processing.layout import Layout
+from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.corners import reported_polygons, ring_neighbours, thin_corners
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 
@@ -31,8 +31,8 @@ class ParcelRings:
         (P + 1,) ring p is entries ``offsets[p]`` to ``offsets[p + 1]``.
     half_edge, xy
         (R,) half-edge, and (R, 2) position of its origin.
-    street
-        (R,) whether the half-edge is street.
+    street, usable
+        (R,) whether the half-edge is street, and whether it is or could become one.
     corner
         (R,) whether the vertex is a corner of the parcel's approximate polygon.
     node
@@ -48,6 +48,7 @@ class ParcelRings:
     half_edge: IntArray
     xy: FloatArray
     street: BoolArray
+    usable: BoolArray
     corner: BoolArray
     node: BoolArray
     inward: ComplexArray
@@ -83,6 +84,7 @@ def parcel_rings(layout: Layout, faces: IntArray) -> ParcelRings:
         half_edge=h,
         xy=xy,
         street=layout.edge_street[h >> 1],
+        usable=(layout.edge_street | (layout.edge_kind == EdgeKind.INTERIOR))[h >> 1],
         corner=_ring_corners(layout, xy, offsets, vertex),
         node=node,
         inward=_continuations(layout, h, offsets),
@@ -137,6 +139,7 @@ class Boundary:
 
     rings: RingBatch
     street: BoolArray
+    usable: BoolArray
     corner: BoolArray
     node: BoolArray
     inward: ComplexArray
@@ -188,7 +191,15 @@ class Boundary:
 
     @cached_property
     def _street_sum(self) -> FloatArray:
-        s = np.where(self.street, np.abs(self.edge), 0.0)
+        return self._sum_where(self.street)
+
+    @cached_property
+    def _usable_sum(self) -> FloatArray:
+        return self._sum_where(self.usable)
+
+    def _sum_where(self, chosen: BoolArray) -> FloatArray:
+        """(B, N + 1) length of the chosen edges up to each vertex."""
+        s = np.where(chosen, np.abs(self.edge), 0.0)
         return np.concatenate([np.zeros((len(s), 1)), np.cumsum(s, axis=1)], axis=1)
 
     def _twice_area_to(self, parcel: IntArray, t: FloatArray) -> FloatArray:
@@ -196,10 +207,12 @@ class Boundary:
         z = self.rings.z[parcel, k]
         return self._cross_sum[parcel, k] + cross(z, z + along * self.edge[parcel, k])
 
-    def _street_to(self, parcel: IntArray, t: FloatArray) -> FloatArray:
+    def _length_to(
+        self, total: FloatArray, chosen: BoolArray, parcel: IntArray, t: FloatArray
+    ) -> FloatArray:
         k, along = self.locate(parcel, t)
-        step = np.where(self.street[parcel, k], np.abs(self.edge[parcel, k]), 0.0)
-        return self._street_sum[parcel, k] + along * step
+        step = np.where(chosen[parcel, k], np.abs(self.edge[parcel, k]), 0.0)
+        return np.asarray(total[parcel, k] + along * step)
 
     def twice_area_between(
         self, parcel: IntArray, start: FloatArray, stop: FloatArray
@@ -210,8 +223,23 @@ class Boundary:
 
     def street_between(self, parcel: IntArray, start: FloatArray, stop: FloatArray) -> FloatArray:
         """Street length along the ring from `start` forward to `stop`."""
-        part = self._street_to(parcel, stop) - self._street_to(parcel, start)
-        return part + np.where(stop < start, self._street_sum[parcel, -1], 0.0)
+        return self._length_between(self._street_sum, self.street, parcel, start, stop)
+
+    def usable_between(self, parcel: IntArray, start: FloatArray, stop: FloatArray) -> FloatArray:
+        """Length that is or could be street along the ring from `start` forward to `stop`."""
+        return self._length_between(self._usable_sum, self.usable, parcel, start, stop)
+
+    def _length_between(
+        self,
+        total: FloatArray,
+        chosen: BoolArray,
+        parcel: IntArray,
+        start: FloatArray,
+        stop: FloatArray,
+    ) -> FloatArray:
+        part = self._length_to(total, chosen, parcel, stop)
+        part = part - self._length_to(total, chosen, parcel, start)
+        return np.asarray(part + np.where(stop < start, total[parcel, -1], 0.0))
 
     @cached_property
     def corners(self) -> tuple[FloatArray, ComplexArray, IntArray]:
@@ -233,6 +261,7 @@ def boundaries(parcels: ParcelRings, rows: IntArray) -> Boundary:
     return Boundary(
         rings=rings,
         street=np.asarray(pad(parcels.street, o, rows), dtype=bool),
+        usable=np.asarray(pad(parcels.usable, o, rows), dtype=bool),
         corner=np.asarray(pad(parcels.corner, o, rows), dtype=bool) & valid,
         node=np.asarray(pad(parcels.node, o, rows), dtype=bool) & valid,
         inward=np.asarray(pad(parcels.inward, o, rows)) * np.conj(rings.axis)[:, None] * valid,

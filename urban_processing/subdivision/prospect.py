@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS
+from urban_processing.mesh.corners import side_irregularity
 from urban_processing.mesh.planar import FloatArray, IntArray
 
 LARGEST = 48
@@ -51,11 +51,6 @@ def prospect_of_area(aspect: FloatArray, content: FloatArray) -> FloatArray:
         Area over the smallest area allowed; cutting goes on until it is below 2.
     """
     return _interpolated(_area_table(), np.log(np.maximum(content, 1.0)), aspect)
-
-
-def side_irregularity(aspect: FloatArray) -> FloatArray:
-    """Second term of Eq. 1 for a rectangle."""
-    return np.asarray(IRREGULARITY_WEIGHTS[1] * ((aspect - 1.0) / (aspect + 1.0)) ** 2)
 
 
 def _interpolated(table: FloatArray, log_area: FloatArray, aspect: FloatArray) -> FloatArray:

@@ -27,6 +27,9 @@ SIDES_COST = 0.05
 """Cost, in irregularity, of a parcel that has not four sides; parcels of at least this cost are
 cut again."""
 
+SHORT_COST = 0.5
+"""Cost, in irregularity, of a parcel without any of the least frontage; in proportion below."""
+
 LEAST_GAIN = 0.01
 """Two parcels are changed only if they gain this much together."""
 
@@ -55,12 +58,13 @@ def recut_irregular(
 ) -> Layout:
     """Join irregular parcels with a neighbour each and cut the two anew where that is better.
 
+    So are parcels with less than the least frontage, where one is given.
     The parcels on both sides of a street are never joined, and both new parcels must be
     reached by the streets that there are. The number of parcels stays the same.
     """
     tried: set[frozenset[int]] = set()
     for i in range(ROUNDS):
-        pairs = _choose_pairs(layout, tried)
+        pairs = _choose_pairs(layout, tried, params)
         if not pairs:
             break
         progress.update(i / ROUNDS, f"Cutting {len(pairs)} irregular parcels again")
@@ -68,20 +72,26 @@ def recut_irregular(
     return layout
 
 
-def _costs(layout: Layout) -> FloatArray:
-    """(F,) irregularity of each parcel, and what it costs not to have four sides."""
+def _costs(layout: Layout, params: CogenerateParams) -> FloatArray:
+    """(F,) irregularity of each parcel, and what sides and frontage cost that are not wanted."""
     mesh = layout.mesh
     half_edges, ring_offsets = mesh.face_rings()
     xy = mesh.xy[mesh.origin[half_edges]]
     corners, offsets = reported_polygons(xy, ring_offsets)
     irregularity = polygon_irregularity(xy[corners], offsets)
-    return np.asarray(irregularity + SIDES_COST * (np.diff(offsets) != 4))
+    cost = irregularity + SIDES_COST * (np.diff(offsets) != 4)
+    if params.least_frontage is not None:
+        short = np.maximum(1.0 - layout.frontage / params.least_frontage, 0.0)
+        cost = cost + SHORT_COST * short
+    return np.asarray(cost)
 
 
-def _choose_pairs(layout: Layout, tried: set[frozenset[int]]) -> list[_Pair]:
+def _choose_pairs(
+    layout: Layout, tried: set[frozenset[int]], params: CogenerateParams
+) -> list[_Pair]:
     """Pair each offender, the worst first, with the neighbour along its longest side."""
     graph = layout.corner_graph
-    cost = _costs(layout)
+    cost = _costs(layout, params)
     lineage = layout.face_lineage.tolist()
     left, right = graph.face[0::2], graph.face[1::2]
     inner = (left != OUTSIDE) & (right != OUTSIDE) & (left != right)
@@ -121,7 +131,7 @@ def _only_contact(left: IntArray, right: IntArray) -> BoolArray:
 
 def _recut(layout: Layout, pairs: list[_Pair], min_area: float, params: CogenerateParams) -> Layout:
     """Cut all pairs anew; those that do not gain are left out and the rest is done again."""
-    before = _costs(layout)
+    before = _costs(layout, params)
     area = layout.mesh.face_area
     while pairs:
         joined, parent = _joined(layout, pairs)
@@ -135,9 +145,8 @@ def _recut(layout: Layout, pairs: list[_Pair], min_area: float, params: Cogenera
             thorough=True,
         )
         cut, done, source = insert_cuts(joined, parcels, ranked, min_area=min_area)
-        gains = _gains(
-            cut, source, faces, done, np.array([_pair_cost(p, before, area) for p in pairs])
-        )
+        costs = np.array([_pair_cost(p, before, area) for p in pairs])
+        gains = _gains(cut, source, faces, done, costs, params)
         if (gains >= LEAST_GAIN).all():
             return cut
         pairs = [p for p, gain in zip(pairs, gains, strict=True) if gain >= LEAST_GAIN]
@@ -154,12 +163,17 @@ def _spread_cost(areas: FloatArray) -> float:
 
 
 def _gains(
-    cut: Layout, source: IntArray, faces: IntArray, done: BoolArray, before: FloatArray
+    cut: Layout,
+    source: IntArray,
+    faces: IntArray,
+    done: BoolArray,
+    before: FloatArray,
+    params: CogenerateParams,
 ) -> FloatArray:
     """How much each pair is better than it was; -inf where it was not cut or is not reached."""
-    cost = _costs(cut)
+    cost = _costs(cut, params)
     area = cut.mesh.face_area
-    reached = is_reached(cut.frontage, area)
+    reached = is_reached(cut.frontage, area, least=params.frontage_limit)
     out = np.full(len(faces), -np.inf)
     for i in np.flatnonzero(done).tolist():
         pieces = np.flatnonzero(source == faces[i])

@@ -8,16 +8,11 @@ import numpy as np
 
 from urban_processing.fields.rings import ComplexArray, cross
 from urban_processing.hashing import UintArray, uniform
-from urban_processing.mesh.corners import IRREGULARITY_WEIGHTS, STRAIGHT_ANGLE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.subdivision.cuts import AREA_ROUNDING, CLEARANCE, Cuts
+from urban_processing.subdivision.halves import Ideal, half_polygons
 from urban_processing.subdivision.parcels import CONTINUES_ANGLE, Boundary
-from urban_processing.subdivision.prospect import (
-    prospect_of_area,
-    prospect_of_quota,
-    side_irregularity,
-)
 
 ALTERNATIVES = 4
 """Number of ranked cuts kept for each parcel."""
@@ -39,8 +34,13 @@ STRETCH = 2.0
 """A weight w of the orientation makes parcels of 1 + `STRETCH` · w, long over short side, ideal
 where their long side lies in the preferred direction."""
 
-OWN_SHARE = 0.2
-"""Weight of the present proportions of a half that is still to be cut."""
+
+WANTED_WEIGHT = 2.0
+"""Proportions count so many times as much where their ratio is given."""
+
+
+FRONTAGE_WEIGHT = 1.0
+"""Weight of halves without any of the least frontage; in proportion below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,26 +83,33 @@ def score_cuts(
     ring_part = boundary.twice_area_between(cuts.parcel, t_b, t_a)
     area = 0.5 * (cuts.bulge + cross(a, b) + ring_part)
     smaller, larger = np.minimum(area, 1.0 - area), np.maximum(area, 1.0 - area)
-    preferred, stretch = _preferred(boundary, cuts.parcel, params)
-    left = _half(boundary, cuts.parcel, a, b, t_a, t_b, preferred, stretch)
-    right = _half(boundary, cuts.parcel, b, a, t_b, t_a, preferred, stretch)
+    ideal = _ideal(boundary, cuts.parcel, params)
+    left = half_polygons(boundary, cuts.parcel, a, b, t_a, t_b, ideal)
+    right = half_polygons(boundary, cuts.parcel, b, a, t_b, t_a, ideal)
     street = np.column_stack(
         [
             boundary.street_between(cuts.parcel, t_b, t_a),
             boundary.street_between(cuts.parcel, t_a, t_b),
         ]
     )
-    reached = street >= params.access_ratio * np.column_stack([left.mean_side, right.mean_side])
+    wanted = params.access_ratio * np.column_stack([left.mean_side, right.mean_side])
+    if params.least_frontage is not None:
+        least = params.least_frontage / boundary.rings.scale[cuts.parcel][:, None]
+        wanted = np.maximum(wanted, least)
+    reached = street >= wanted
     w_size, w_shape, w_access = params.weights
     parcel_quota = quota[cuts.parcel]
     shape = [left.irregularity, right.irregularity]
     if rules.prospect > 0:
+        prospect = rules.prospect * (1.0 if params.width_depth is None else WANTED_WEIGHT)
         left_quota = _left_quota(area, parcel_quota)
         total = area / min_share[cuts.parcel], (1.0 - area) / min_share[cuts.parcel]
         shape = [
-            left.with_prospect(total[0], left_quota, rules.prospect),
-            right.with_prospect(total[1], parcel_quota - left_quota, rules.prospect),
+            left.with_prospect(total[0], left_quota, prospect),
+            right.with_prospect(total[1], parcel_quota - left_quota, prospect),
         ]
+    elif params.width_depth is not None:
+        shape = [left.by_proportions(), right.by_proportions()]
     quality = (
         w_size * _balance(smaller / larger, rules.size_cap)
         + w_shape / (1.0 + shape[0] + shape[1])
@@ -110,18 +117,25 @@ def score_cuts(
         - rules.clearance * np.clip(1.0 - cuts.clearance / CLEARANCE, 0.0, 1.0)
     )
     quality -= w_size * np.minimum(1.0, QUOTA_WEIGHT * _quota_misfit(area, parcel_quota))
+    if params.least_frontage is not None:
+        # what has no street yet will have one along its shorter sides, as a rule
+        later = np.column_stack([left.least_width, right.least_width])
+        short = 1.0 - np.where(street > 0, street, later) / least
+        quality -= FRONTAGE_WEIGHT * np.clip(short, 0.0, 1.0).sum(axis=1)
     if params.continuity > 0:
         ends = _continues(boundary, cuts.parcel, node_a, cuts.leaving).astype(np.float64)
         ends += _continues(boundary, cuts.parcel, node_b, -cuts.arriving)
         quality += params.continuity * 0.5 * ends
     if params.orientation is not None and rules.prospect == 0:
-        along = _oriented(b - a, preferred)
+        along = _oriented(b - a, ideal.preferred)
         quality += params.weight_orientation * along
     if rules.variation > 0:
         quality += rules.variation * _noise(cuts.parcel, lineage, params.seed)
     legal = (
         (smaller >= min_share[cuts.parcel] * (1.0 - AREA_ROUNDING)) & (left.n >= 3) & (right.n >= 3)
     )
+    if params.frontage_limit > 0:
+        legal &= _possible_frontage(boundary, cuts.parcel, t_a, t_b, b - a) >= least[:, 0]
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
@@ -131,6 +145,15 @@ def score_cuts(
         t_b,
         quality,
     )
+
+
+def _possible_frontage(
+    boundary: Boundary, parcel: IntArray, t_a: FloatArray, t_b: FloatArray, chord: ComplexArray
+) -> FloatArray:
+    """(C,) length that is or could be street around the half that has less of it."""
+    left = boundary.usable_between(parcel, t_b, t_a)
+    right = boundary.usable_between(parcel, t_a, t_b)
+    return np.asarray(np.minimum(left, right) + np.abs(chord))
 
 
 def _noise(parcel: IntArray, lineage: UintArray, seed: int) -> FloatArray:
@@ -194,15 +217,14 @@ def _continues(
     return np.asarray((inward * np.conj(wanted)).real > np.cos(CONTINUES_ANGLE))
 
 
-def _preferred(
-    boundary: Boundary, parcel: IntArray, params: CogenerateParams
-) -> tuple[ComplexArray, float]:
-    """Preferred direction of long sides in each parcel's frame, and the stretch across it."""
-    if params.orientation is None:
-        return np.ones(len(parcel), dtype=np.complex128), 1.0
-    direction = np.exp(1j * np.radians(params.orientation))
-    stretch = 1.0 + STRETCH * params.weight_orientation
-    return np.asarray(direction * np.conj(boundary.rings.axis[parcel])), stretch
+def _ideal(boundary: Boundary, parcel: IntArray, params: CogenerateParams) -> Ideal:
+    """Ideal proportions of the halves of each candidate, in the frame of its parcel."""
+    preferred, stretch = np.ones(len(parcel), dtype=np.complex128), 1.0
+    if params.orientation is not None:
+        direction = np.exp(1j * np.radians(params.orientation))
+        preferred = np.asarray(direction * np.conj(boundary.rings.axis[parcel]))
+        stretch = 1.0 + STRETCH * params.weight_orientation
+    return Ideal(preferred, stretch, params.width_depth)
 
 
 def _oriented(chord: ComplexArray, preferred: ComplexArray) -> FloatArray:
@@ -210,143 +232,6 @@ def _oriented(chord: ComplexArray, preferred: ComplexArray) -> FloatArray:
     length = np.abs(chord)
     along = (chord * np.conj(preferred)).real / np.where(length > 0, length, 1.0)
     return np.asarray(1.0 - 2.0 / np.pi * np.arccos(np.clip(np.abs(along), 0.0, 1.0)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Half:
-    """Approximate polygons of one half of each candidate.
-
-    `aspect` is the mean of two opposite sides over that of the other two, seen with the stretch
-    of a preferred orientation; 0 where the polygon is no quadrilateral.
-    """
-
-    irregularity: FloatArray
-    by_angle: FloatArray
-    mean_side: FloatArray
-    n: IntArray
-    aspect: FloatArray
-
-    def with_prospect(self, content: FloatArray, quota: IntArray, weight: float) -> FloatArray:
-        """Irregularity with what later cuts can make of the half in place of its proportions."""
-        folded = np.exp(np.abs(np.log(np.where(self.aspect > 0, self.aspect, 1.0))))
-        later = np.where(
-            quota > 0,
-            prospect_of_quota(folded, quota),
-            prospect_of_area(folded, np.maximum(content, 1.0)),
-        )
-        own = side_irregularity(folded)
-        uncut = np.where(quota > 0, quota < 2, content < 2.0)
-        shown = np.where(uncut, own, later + OWN_SHARE * own)
-        return np.asarray(
-            np.where(self.aspect > 0, self.by_angle + weight * shown, self.irregularity)
-        )
-
-
-def _half(
-    boundary: Boundary,
-    parcel: IntArray,
-    a: ComplexArray,
-    b: ComplexArray,
-    t_a: FloatArray,
-    t_b: FloatArray,
-    preferred: ComplexArray,
-    stretch: float,
-) -> _Half:
-    """Approximate polygon of the half that goes a, b, ring, a.
-
-    The cut counts as one side; corners straighter than 135° are deleted as in the reported
-    polygon.
-    """
-    corner_t, corner_z, number = boundary.corners
-    exists = np.isfinite(corner_t)[parcel]
-    own = np.where(exists, corner_t[parcel], 0.0)
-    perimeter = boundary.perimeter[parcel]
-    small = 1e-9 * perimeter[:, None]
-    # lengths from b forward; corners strictly between b and a
-    ahead = (own - t_b[:, None]) % perimeter[:, None]
-    span = ((t_a - t_b) % perimeter)[:, None]
-    between = exists & (ahead > small) & (ahead < span - small)
-    between &= ahead < perimeter[:, None] - small
-    # in ring order the corners between are consecutive but for the wrap
-    count = between.sum(axis=1)
-    n_own = np.maximum(number[parcel], 1)
-    width = int(count.max(initial=0))
-    first = _run_start(between, number[parcel], count)
-    k = (first[:, None] + np.arange(width)[None]) % n_own[:, None]
-    z = np.concatenate(
-        [a[:, None], b[:, None], np.take_along_axis(corner_z[parcel], k, axis=1)], axis=1
-    )
-    z, n = _thinned(z, count + 2)
-    return _measured(z, n, preferred, stretch)
-
-
-def _run_start(between: BoolArray, number: IntArray, count: IntArray) -> IntArray:
-    """First corner of the cyclic run of corners that lie between b and a."""
-    rows = np.arange(len(between))
-    wraps = between[:, 0] & between[rows, np.maximum(number - 1, 0)] & (count < number)
-    # the run continues from the ring's end to its beginning: it starts after the last gap
-    columns = np.arange(between.shape[1])[None]
-    gap = ~between & (columns < number[:, None])
-    last_gap = np.where(gap.any(axis=1), between.shape[1] - 1 - np.argmax(gap[:, ::-1], axis=1), -1)
-    plain = np.argmax(between, axis=1)
-    return np.asarray(np.where(wraps, last_gap + 1, plain))
-
-
-def _thinned(z: ComplexArray, n: IntArray) -> tuple[ComplexArray, IntArray]:
-    """Delete the straightest corner while straighter than 135° and more than three remain."""
-    columns = np.arange(z.shape[1])[None]
-    for _ in range(z.shape[1] - 3):
-        included = np.pi - np.abs(_turns(z, n))
-        included = np.where(columns < n[:, None], included, -1.0)
-        worst = included.argmax(axis=1)
-        rows = np.flatnonzero((included[np.arange(len(z)), worst] > STRAIGHT_ANGLE) & (n > 3))
-        if len(rows) == 0:
-            break
-        shift = np.minimum(columns + (columns >= worst[rows, None]), z.shape[1] - 1)
-        z = z.copy()
-        z[rows] = np.take_along_axis(z[rows], shift, axis=1)
-        n = n.copy()
-        n[rows] -= 1
-    return z, n
-
-
-def _neighbours(z: ComplexArray, n: IntArray) -> tuple[ComplexArray, ComplexArray]:
-    columns = np.arange(z.shape[1])[None]
-    before = np.where(columns == 0, n[:, None] - 1, columns - 1)
-    after = np.where(columns == n[:, None] - 1, 0, np.minimum(columns + 1, z.shape[1] - 1))
-    return np.take_along_axis(z, before, axis=1), np.take_along_axis(z, after, axis=1)
-
-
-def _turns(z: ComplexArray, n: IntArray) -> FloatArray:
-    before, after = _neighbours(z, n)
-    return np.asarray(np.angle((after - z) * np.conj(z - before)))
-
-
-def _measured(z: ComplexArray, n: IntArray, preferred: ComplexArray, stretch: float) -> _Half:
-    """Eq. 1 and the proportions of padded polygons."""
-    _, after = _neighbours(z, n)
-    valid = np.arange(z.shape[1])[None] < n[:, None]
-    side = np.where(valid, np.abs(after - z), 0.0)
-    angle = np.where(valid, np.pi - _turns(z, n), 0.0)
-    mean_side, mean_angle = side.sum(axis=1) / n, angle.sum(axis=1) / n
-    by_angle = (np.where(valid, angle - mean_angle[:, None], 0.0) ** 2).sum(axis=1) / n
-    by_side = (np.where(valid, side - mean_side[:, None], 0.0) ** 2).sum(axis=1) / n
-    g_angle, g_side = IRREGULARITY_WEIGHTS
-    safe = np.where(mean_side > 0, mean_side, 1.0)
-    aspect = np.zeros(len(z))
-    if z.shape[1] > 3:
-        quad = np.flatnonzero((n == 4) & (side[:, :4].min(axis=1) > 0))
-        # seen in a plane that is stretched across the preferred direction
-        turned = (after[quad, :4] - z[quad, :4]) * np.conj(preferred[quad])[:, None]
-        seen = np.hypot(turned.real, stretch * turned.imag)
-        aspect[quad] = (seen[:, 0] + seen[:, 2]) / (seen[:, 1] + seen[:, 3])
-    return _Half(
-        irregularity=g_angle * by_angle + g_side * by_side / safe**2,
-        by_angle=g_angle * by_angle,
-        mean_side=mean_side,
-        n=n,
-        aspect=aspect,
-    )
 
 
 def rank_cuts(boundary: Boundary, scored: ScoredCuts) -> tuple[IntArray, IntArray]:
