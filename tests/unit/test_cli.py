@@ -105,7 +105,9 @@ def test_help_shows_every_parameter_with_unit_limits_and_default(spec: Algorithm
         elif "minimum" in shown:
             note += [f"atleast{shown['minimum']:g}"]
         if shown["default"] is not None:
-            note += [f"default{shown['default']}".removesuffix(".0")]
+            words = {True: "yes", False: "no"} if shown.get("type") == "boolean" else {}
+            default = words.get(shown["default"], shown["default"])
+            note += [f"default{default}".removesuffix(".0")]
         assert f"[{';'.join(note)}]" in text if note else True
 
 

@@ -25,6 +25,7 @@ from urban_processing.paths import geopackage_problems
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.schema import INPUT_BOUNDARY, ISSUES, PARCELS, PROVENANCE, STREETS
 from urban_processing.site import FloatArray, Frame, Issue
+from urban_processing.street_rules import StreetRules
 
 FILE_FORMAT = 1
 """Number of the way in which layout files keep what the schema does not say."""
@@ -125,6 +126,7 @@ def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:
         issues = _read_issues(file)
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
         return layout.replace(
+            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
             corners_given=state["corners_given"],
             history=_read_history(file),
             input_parts=_read_input(file),
@@ -182,6 +184,7 @@ def _state(layout: Layout) -> str:
             "min_area": layout.min_area,
             "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
             "corners_given": layout.corners_given,
+            "street_rules": layout.street_rules.as_dict(),
         }
     )
 

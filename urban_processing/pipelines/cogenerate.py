@@ -12,12 +12,14 @@ import numpy as np
 from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance, first_layout, simplify_site
 from urban_processing.layout import Layout, Step
-from urban_processing.mesh.planar import BoolArray, IntArray
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
+from urban_processing.rights_of_way import lay_out_rights_of_way
+from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas
 from urban_processing.site import Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
@@ -32,6 +34,9 @@ MEAN_OVER_MIN = 1.37
 
 FLOOR_SHARE = 0.6
 """Smallest area allowed where the number of parcels is given, over their mean area."""
+
+SMALL_NET_SHARE = 0.25
+"""Net parcels under this share of the mean net area are joined where the number was given."""
 
 MOST_PARCELS = 2_000_000
 """More parcels than this are refused: the run would take hours and all the memory."""
@@ -127,7 +132,7 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         levels.update(min(done, 1.0) ** 3, _message(state))
         state = step(state)
     levels.update(1.0, _message(state))
-    layout = canonical(finish(state, progress.slice(LEVELS_SHARE, 1.0)))
+    layout = finish(state, progress.slice(LEVELS_SHARE, 1.0))
     progress.update(1.0)
     entry = Step(
         algorithm="cogenerate",
@@ -155,9 +160,10 @@ def estimate(site: Site, params: CogenerateParams) -> Estimate:
 
 
 def smallest_area(site: Site, params: CogenerateParams) -> float:
-    """Smallest area in m² that a cut may leave."""
+    """Smallest gross area in m² that a cut may leave."""
     if params.min_area is not None:
-        return params.min_area
+        rules = params.street_rules
+        return gross_floor(params.min_area, rules) if rules.net_min_area else params.min_area
     return FLOOR_SHARE * site.area / (params.parcels or 1)
 
 
@@ -169,6 +175,7 @@ def begin(site: Site, params: CogenerateParams) -> State:
         mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
         tolerance = default_tolerance(mean / MEAN_OVER_MIN)
     layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
+    layout = layout.replace(street_rules=params.street_rules)
     quota = None if params.parcels is None else shared_out(layout.mesh.face_area, params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)
     if quota is not None:
@@ -244,10 +251,26 @@ def finish(state: State, progress: Progress = SILENT) -> Layout:
         )
     progress.update(RECUT_SHARE, "Cleaning up the streets")
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
-    min_area = state.min_area
-    if state.quota is not None:
-        whole = layout.mesh.face_area >= min_area
-        min_area = float(layout.mesh.face_area[whole].min(initial=np.inf))
-        min_area = min_area if math.isfinite(min_area) else state.min_area
-    layout = layout.replace(min_area=min_area)
+    layout = _with_floor(canonical(layout), state)
     return layout.replace(issues=(*layout.issues, *findings(layout, params)))
+
+
+def _with_floor(layout: Layout, state: State) -> Layout:
+    """The layout with the smallest area that it promises, gross or net, and keeps.
+
+    Where the number of parcels was given, the promise is the smallest area found.
+    """
+    net = layout.street_rules.net_min_area
+    if net:
+        floor = state.params.min_area or SMALL_NET_SHARE * _net_areas(layout).mean()
+        layout = canonical(keep_net_areas(layout, floor))
+    if state.quota is None:
+        return layout.replace(min_area=state.params.min_area)
+    area = _net_areas(layout) if net else layout.mesh.face_area
+    least = floor if net else state.min_area
+    found = float(area[area >= least].min(initial=np.inf))
+    return layout.replace(min_area=found if math.isfinite(found) else least)
+
+
+def _net_areas(layout: Layout) -> FloatArray:
+    return lay_out_rights_of_way(layout).net_area
