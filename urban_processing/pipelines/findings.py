@@ -88,22 +88,36 @@ def _sizes(layout: Layout) -> list[Issue]:
         area, which = lay_out_rights_of_way(layout).net_area, " net"
     least = np.full(len(area), layout.min_area)
     most = VERY_LARGE * least
-    return _of_parcels(
-        layout,
-        "part_below_min_area",
-        f"This part of the land ({{value:.0f}} m²{which}) is smaller than the smallest parcel "
-        "allowed ({limit:.0f} m²) and stays one parcel.",
-        area < least * (1.0 - AREA_ROUNDING),
-        area,
-        least,
-    ) + _of_parcels(
-        layout,
-        "parcel_not_cut",
-        f"No cut of this parcel ({{value:.0f}} m²{which}) leaves two simple halves that are "
-        "large enough; it is larger than {limit:.0f} m².",
-        area > most,
-        area,
-        most,
+    small = area < least * (1.0 - AREA_ROUNDING)
+    alone = np.bincount(layout.face_part)[layout.face_part] == 1
+    return (
+        _of_parcels(
+            layout,
+            "part_below_min_area",
+            f"This part of the land ({{value:.0f}} m²{which}) is smaller than the smallest parcel "
+            "allowed ({limit:.0f} m²) and stays one parcel.",
+            small & alone,
+            area,
+            least,
+        )
+        + _of_parcels(
+            layout,
+            "parcel_below_min_area",
+            f"This parcel ({{value:.0f}} m²{which}) is smaller than the smallest allowed "
+            "({limit:.0f} m²): it cannot be joined with another without cutting off a street.",
+            small & ~alone,
+            area,
+            least,
+        )
+        + _of_parcels(
+            layout,
+            "parcel_not_cut",
+            f"No cut of this parcel ({{value:.0f}} m²{which}) leaves two simple halves that are "
+            "large enough; it is larger than {limit:.0f} m².",
+            area > most,
+            area,
+            most,
+        )
     )
 
 

@@ -104,14 +104,11 @@ def _kerbs(surfaces: npt.NDArray[np.object_]) -> _Kerbs:
     parts, surface = shapely.get_parts(surfaces, return_index=True)
     rings, part = shapely.get_rings(shapely.orient_polygons(parts), return_index=True)
     xy, ring = shapely.get_coordinates(rings, return_index=True)
-    first = np.flatnonzero(np.diff(ring, prepend=-1))
-    last = np.append(first[1:], len(ring)) - 1  # repeats the first
-    kept = np.ones(len(ring), dtype=bool)
-    kept[last] = False
+    kept = np.diff(ring, append=-1) == 0  # the last vertex of a ring repeats the first
     xy, ring = xy[kept], ring[kept]
     n = len(xy)
     start = np.flatnonzero(np.diff(ring, prepend=-1))
-    end = np.append(start[1:], n) - 1
+    end = np.flatnonzero(np.diff(ring, append=-1))
     following, previous = np.arange(n) + 1, np.arange(n) - 1
     following[end], previous[start] = start, end
     z = xy[:, 0] + 1j * xy[:, 1]

@@ -32,8 +32,9 @@ def keep_net_areas(layout: Layout, min_area: float) -> Layout:
     """Join parcels until none has a net area under `min_area`, in m².
 
     Each is joined with the neighbour with which it makes the best shape. A parcel that is a
-    block of its own first loses one of the streets around it, where all others stay reached
-    and the network stays whole. A part that ends as one parcel keeps it, however small.
+    block of its own first loses one of the streets around it, one that leaves no new street
+    end if there is one, and takes up those that had no other street. A part that ends as one
+    parcel keeps it, however small.
     """
     while True:
         net = lay_out_rights_of_way(layout).net_area
@@ -98,8 +99,8 @@ def _costs(layout: Layout, pairs: list[Pair]) -> FloatArray:
     """Irregularity of the parcels that pairs would make, and what it costs not to be quads."""
     polygons = layout.mesh.face_polygons()
     two = np.array([(p.keeps, p.goes) for p in pairs])
-    made = shapely.coverage_union(polygons[two[:, 0]], polygons[two[:, 1]])
-    rings = shapely.get_exterior_ring(made)
+    made = shapely.coverage_union_all(polygons[two], axis=1)
+    rings = shapely.get_exterior_ring(shapely.get_geometry(made, 0))
     out = np.full(len(pairs), np.inf)
     simple = np.flatnonzero(~shapely.is_missing(rings))
     xy, ring = shapely.get_coordinates(rings[simple], return_index=True)
@@ -114,12 +115,41 @@ def _costs(layout: Layout, pairs: list[Pair]) -> FloatArray:
 
 def _opened(layout: Layout, net: FloatArray, small: BoolArray) -> Layout:
     """Take away one street beside the smallest parcel for which that can be done."""
-    for face in sorted(np.flatnonzero(small).tolist(), key=lambda f: (net[f], f)):
-        for run in _runs_beside(layout, face):
-            opened = _without_street(layout, run)
-            if _is_sound(opened, layout):
-                return opened
+    faces = sorted(np.flatnonzero(small).tolist(), key=lambda f: (net[f], f))
+    for most_ends in (_ends(layout), math.inf):
+        for face in faces:
+            for run in _runs_beside(layout, face):
+                opened = _connected(_without_street(layout, run))
+                if _ends(opened) <= most_ends:
+                    whole = _absorbing(opened, face, _reached(layout))
+                    if whole is not None:
+                        return whole
     return layout
+
+
+def _absorbing(layout: Layout, face: int, reached: BoolArray) -> Layout | None:
+    """Join a parcel with the neighbours that lost their street; None where one stays without."""
+    while True:
+        lost = reached & ~_reached(layout)
+        if not lost.any():
+            return layout
+        pair = next(
+            (
+                p
+                for p in joinable_pairs(layout)
+                if face in (p.keeps, p.goes) and (lost[p.keeps] or lost[p.goes])
+            ),
+            None,
+        )
+        if pair is None:
+            return None
+        layout, parent = join_pairs(layout, [pair])
+        face, reached = int(np.searchsorted(parent, pair.keeps)), reached[parent]
+
+
+def _reached(layout: Layout) -> BoolArray:
+    least = reached_frontage(layout.mesh.face_area) - MEASURED_M
+    return np.asarray(layout.frontage >= least)
 
 
 def _runs_beside(layout: Layout, face: int) -> list[IntArray]:
@@ -151,23 +181,21 @@ def _without_street(layout: Layout, edges: IntArray) -> Layout:
     return layout.replace(edge_street=street, edge_level=level)
 
 
-def _is_sound(after: Layout, before: Layout) -> bool:
-    """Whether all parcels stay reached, no street ends anew and no network falls apart."""
-    mesh = after.mesh
-    least = reached_frontage(mesh.face_area) - MEASURED_M
-    if ((after.frontage < least) & (before.frontage >= least)).any():
-        return False
-    return _ends(after) <= _ends(before) and _components(after) <= _components(before)
-
-
 def _ends(layout: Layout) -> int:
     at = layout.mesh.origin[np.repeat(layout.edge_street, 2)]
     return int((np.bincount(at) == 1).sum())
 
 
-def _components(layout: Layout) -> int:
+def _connected(layout: Layout) -> Layout:
+    """The layout with the longest connected network of each part alone."""
     mesh = layout.mesh
-    a, b = mesh.origin.reshape(-1, 2)[layout.edge_street].T
+    edges = np.flatnonzero(layout.edge_street)
+    a, b = mesh.origin.reshape(-1, 2)[edges].T
     shape = (mesh.n_vertices, mesh.n_vertices)
-    label = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=shape))[1]
-    return len(np.unique(label[a]))
+    label = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=shape))[1][a]
+    part = layout.face_part[mesh.face.reshape(-1, 2)[edges].max(axis=1)]
+    length = np.bincount(label, weights=mesh.edge_length[edges])[label]
+    order = np.lexsort((label, -np.round(length, 6), part))
+    first = order[np.unique(part[order], return_index=True)[1]]
+    kept = np.isin(label, label[first])
+    return layout if kept.all() else _without_street(layout, edges[~kept])
