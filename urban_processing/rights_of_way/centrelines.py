@@ -11,9 +11,9 @@ import shapely
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.rights_of_way.partition import RightsOfWay, partition
 from urban_processing.rights_of_way.surfaces import (
+    Circles,
     Geometries,
     StreetSides,
-    TurningHeads,
     street_surfaces,
 )
 from urban_processing.site import GRID
@@ -105,7 +105,7 @@ def _segments(
 
 def _heads(
     blocks: Geometries, rims: Geometries, segments: FloatArray, rank: IntArray, radius: float
-) -> TurningHeads:
+) -> Circles:
     """Circles where a single segment ends inside the land."""
     ends = segments.reshape(-1, 2)
     places, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
@@ -113,4 +113,4 @@ def _heads(
     dead = (count == 1) & (radius > 0) & ~shapely.dwithin(at, shapely.union_all(rims), BESIDE)
     end, block = shapely.STRtree(blocks).query(at[dead], predicate="intersects")
     chosen = first[dead][end]
-    return TurningHeads(block, ends[chosen], np.full(len(chosen), radius), rank[chosen // 2])
+    return Circles(block, ends[chosen], np.full(len(chosen), radius), rank[chosen // 2])

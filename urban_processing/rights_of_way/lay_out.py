@@ -11,9 +11,9 @@ from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import OUTSIDE, IntArray
 from urban_processing.rights_of_way.partition import RightsOfWay, partition
 from urban_processing.rights_of_way.surfaces import (
+    Circles,
     Geometries,
     StreetSides,
-    TurningHeads,
     street_surfaces,
 )
 from urban_processing.street_rules import StreetClass
@@ -114,7 +114,7 @@ def _street_sides(layout: Layout, network: StreetNetwork) -> StreetSides:
     return StreetSides(sides[:, 0], ends, width[edge], rank[edge])
 
 
-def _turning_heads(layout: Layout, network: StreetNetwork) -> TurningHeads:
+def _turning_heads(layout: Layout, network: StreetNetwork) -> Circles:
     """Circles at dead ends, but for those on the outer rim, where a street leaves the land."""
     mesh, radius = layout.mesh, layout.street_rules.turning_radius
     on_rim = np.zeros(mesh.n_vertices, dtype=bool)
@@ -129,7 +129,7 @@ def _turning_heads(layout: Layout, network: StreetNetwork) -> TurningHeads:
     half, edge = half[dead], edge[dead]
     beside = np.stack([mesh.face[half], mesh.face[half ^ 1]])
     block = layout.face_block[beside.max(axis=0)]
-    return TurningHeads(
+    return Circles(
         block, mesh.xy[mesh.origin[half]], np.full(len(half), radius), _ranks(network)[edge]
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,10 +44,14 @@ class StreetSides:
     width: FloatArray
     rank: IntArray
 
+    def same(self, a: int, b: int) -> bool:
+        """Whether two segments have the same class and width."""
+        return bool(self.rank[a] == self.rank[b] and self.width[a] == self.width[b])
+
 
 @dataclass(frozen=True, eq=False)
-class TurningHeads:
-    """Circles at dead ends: block, centre, radius in metres and rank of the street of each."""
+class Circles:
+    """Surfaces around points: block, centre, radius in metres and rank of the class of each."""
 
     block: IntArray
     centre: FloatArray
@@ -74,29 +80,32 @@ class Surfaces:
 
 
 def street_surfaces(
-    blocks: Geometries, sides: StreetSides, heads: TurningHeads, *, corner_radius: float
+    blocks: Geometries, sides: StreetSides, heads: Circles, *, corner_radius: float
 ) -> Surfaces:
     """Widen streets within each block by half their width, with round corners and ends.
 
     A block knows the streets on its own boundary alone, so that a wide street which ends at
-    a narrow one leaves no dent on the far side.
+    a narrow one leaves no dent on the far side. Where streets meet or end, a circle closes what
+    lies between them; it is as wide as the two of them that go on most nearly straight.
 
     Parameters
     ----------
     blocks
         (B,) polygons.
     sides, heads
-        Streets and dead ends, by block.
+        Streets by block, and turning heads.
     corner_radius
         Radius in metres of the corners of blocks.
     """
     strips, block, rank = _strips(sides)
-    circles = shapely.buffer(shapely.points(heads.centre), heads.radius, quad_segs=2 * SEGMENTS)
-    regions = np.concatenate([strips, np.atleast_1d(circles)]).astype(object)
-    block, rank = np.concatenate([block, heads.block]), np.concatenate([rank, heads.rank])
-    whole = _united(len(blocks), regions, block)
+    joints = _joints(sides)
+    regions = np.concatenate([strips, _discs(joints, SEGMENTS), _discs(heads, 2 * SEGMENTS)])
+    block = np.concatenate([block, joints.block, heads.block])
+    rank = np.concatenate([rank, joints.rank, heads.rank])
+    regions, (block, rank) = _united(regions, block, rank)
+    whole, (owner,) = _united(regions, block)
     shapely.prepare(blocks)
-    fillets = _within(blocks, round_corners(whole, corner_radius))
+    fillets = _within(blocks, round_corners(whole, corner_radius), owner)
     lines = np.append(shapely.boundary(regions), fillets.arcs)
     owner = np.append(block, fillets.owner)
     outlines = shapely.get_parts(shapely.intersection(blocks[owner], lines))
@@ -119,27 +128,68 @@ def _strips(sides: StreetSides) -> tuple[Geometries, IntArray, IntArray]:
     group = np.cumsum(first) - 1
     pieces = shapely.multilinestrings(shapely.linestrings(sides.segments[order]), indices=group)
     at = order[first]
-    strips = shapely.buffer(shapely.line_merge(pieces), sides.width[at] / 2, quad_segs=SEGMENTS)
+    strips = shapely.buffer(
+        shapely.line_merge(pieces), sides.width[at] / 2, quad_segs=SEGMENTS, cap_style="flat"
+    )
     return np.asarray(strips, dtype=object), sides.block[at], sides.rank[at]
 
 
-def _united(n: int, regions: Geometries, block: IntArray) -> Geometries:
-    """(n,) union of the regions of each block, None where there is none."""
-    out = np.full(n, None, dtype=object)
-    order = np.argsort(block, kind="stable")
-    for group in np.split(order, np.flatnonzero(np.diff(block[order])) + 1):
-        if len(group):
-            out[block[group[0]]] = (
-                regions[group[0]] if len(group) == 1 else shapely.union_all(regions[group])
-            )
-    return out
+def _discs(circles: Circles, segments: int) -> Geometries:
+    centres = shapely.points(circles.centre)
+    return np.asarray(shapely.buffer(centres, circles.radius, quad_segs=segments), dtype=object)
 
 
-def _within(blocks: Geometries, fillets: Fillets) -> Fillets:
-    """Those whose corner lies inside the block, not on the far side of the street."""
-    inside = shapely.contains_xy(blocks[fillets.owner], *fillets.corner.T)
+def _joints(sides: StreetSides) -> Circles:
+    """Circles where the strips of a block end: at its ends, junctions and changes of width."""
+    n = len(sides.block)
+    place = np.concatenate([sides.segments[:, 0], sides.segments[:, 1]])
+    toward = np.concatenate([sides.segments[:, 1], sides.segments[:, 0]]) - place
+    of = np.tile(np.arange(n), 2)
+    _, vertex = np.unique(place + 0.0, axis=0, return_inverse=True)
+    order = np.lexsort((of, vertex.ravel(), sides.block[of]))
+    at = np.column_stack([sides.block[of], vertex.ravel()])[order]
+    start = np.flatnonzero(np.r_[True, (np.diff(at, axis=0) != 0).any(axis=1)][: len(at)])
+    angle = np.arctan2(toward[:, 1], toward[:, 0])
+    chosen = []
+    for ends in np.split(order, start[1:]) if n else []:
+        meeting = of[ends]
+        if len(ends) == 2 and sides.same(meeting[0], meeting[1]):
+            continue
+        through = meeting[list(_straightest(angle[ends]))]
+        widest = max(through.tolist(), key=lambda s: (sides.width[s], -sides.rank[s], -s))
+        chosen.append((int(ends[0]), widest))
+    end, street = np.array(chosen, dtype=np.int64).reshape(-1, 2).T
+    return Circles(sides.block[street], place[end], sides.width[street] / 2, sides.rank[street])
+
+
+def _straightest(angle: FloatArray) -> tuple[int, ...]:
+    """The two of some directions that are most nearly opposite; the only one of one."""
+    if len(angle) == 1:
+        return (0,)
+    bend = {
+        (i, j): round(abs(math.remainder(angle[i] - angle[j] - math.pi, math.tau)), 9)
+        for i, j in itertools.combinations(range(len(angle)), 2)
+    }
+    return min(bend, key=lambda pair: (bend[pair], pair))
+
+
+def _united(regions: Geometries, *keys: IntArray) -> tuple[Geometries, list[IntArray]]:
+    """Union of the regions that have the same keys, and these keys, in order."""
+    order = np.lexsort(keys[::-1])
+    new = np.any([np.diff(key[order], prepend=-1) != 0 for key in keys], axis=0)
+    start = np.flatnonzero(new)
+    groups = np.split(order, start[1:]) if len(order) else []
+    united = np.empty(len(groups), dtype=object)
+    united[:] = [regions[g[0]] if len(g) == 1 else shapely.union_all(regions[g]) for g in groups]
+    return united, [key[order[start]] for key in keys]
+
+
+def _within(blocks: Geometries, fillets: Fillets, owner: IntArray) -> Fillets:
+    """Those whose corner lies inside the block that owns the surface, not beyond its streets."""
+    block = owner[fillets.owner]
+    inside = shapely.contains_xy(blocks[block], *fillets.corner.T)
     return Fillets(
-        fillets.owner[inside],
+        block[inside],
         fillets.corner[inside],
         fillets.arcs[inside],
         fillets.wedges[inside],
