@@ -18,14 +18,20 @@ from urban_processing.street_rules import StreetRules
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.recut import SIDES_COST, Pair, join_pairs, joinable_pairs
 
+CORNERS = 1.1
+"""Gross over net floor besides one street: more leaves fewer parcels, less joins more of them."""
+
 SIZE_COST = 0.1
 """Cost, in irregularity, of each smallest area allowed that a joined parcel is large."""
 
 
 def gross_floor(net_area: float, rules: StreetRules) -> float:
-    """Gross area in m² of a square that has `net_area` beside a local street."""
+    """Gross area in m² from which most parcels have `net_area`.
+
+    That of a square which has `net_area` beside a local street, and a little for corners.
+    """
     half = rules.local / 2
-    return ((half + math.sqrt(half * half + 4.0 * net_area)) / 2.0) ** 2
+    return CORNERS * ((half + math.sqrt(half * half + 4.0 * net_area)) / 2.0) ** 2
 
 
 def keep_net_areas(layout: Layout, min_area: float) -> Layout:
