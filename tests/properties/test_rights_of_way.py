@@ -20,7 +20,7 @@ from urban_processing.pipelines.cogenerate import cogenerate
 from urban_processing.rights_of_way import lay_out_rights_of_way, rights_of_way_of_lines
 
 FEW = settings(
-    max_examples=20, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 
 WIDTHS = st.fixed_dictionaries(
