@@ -333,6 +333,18 @@ def test_widths_that_are_none_are_refused(name: str) -> None:
         CogenerateParams(min_area=400, **{f"{name}_width": -1.0})
 
 
+@pytest.mark.parametrize("width", [0.0, -3.0, math.nan])
+def test_lines_without_width_are_refused(width: float) -> None:
+    with pytest.raises(ParameterError, match="above 0"):
+        rights_of_way_of_lines(SQUARE, [line((0, 9), (9, 9))], width=width)
+
+
+def test_land_without_lines_stays_whole() -> None:
+    blocks, streets = rights_of_way_of_lines(SQUARE, [], width=10)
+    assert len(blocks) == 1
+    assert streets.net_area.tolist() == [200.0**2]
+
+
 def test_radii_below_zero_are_refused_together() -> None:
     with pytest.raises(ParameterError) as error:
         CogenerateParams(min_area=400, corner_radius=-1, turning_radius=-2)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from urban_processing.errors import ParameterError
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.rights_of_way.partition import RightsOfWay, partition
 from urban_processing.rights_of_way.surfaces import (
@@ -55,6 +56,11 @@ def rights_of_way_of_lines(
     rights_of_way
         `RightsOfWay` whose "parcels" are these blocks.
 
+    Raises
+    ------
+    ParameterError
+        If a width is not above 0.
+
     Examples
     --------
     >>> land = [shapely.box(0, 0, 100, 100)]
@@ -65,6 +71,8 @@ def rights_of_way_of_lines(
     """
     n = len(centrelines)
     widths = np.broadcast_to(np.asarray(width, dtype=np.float64), (n,))
+    if not (widths > 0).all() or not np.isfinite(widths).all():
+        raise ParameterError("Each width must be a number of metres above 0.")
     ranks = np.zeros(n, dtype=np.int64) if rank is None else np.asarray(rank, dtype=np.int64)
     rims = shapely.boundary(np.asarray(land, dtype=object))
     edges = shapely.get_parts(shapely.union_all([*rims, *centrelines], grid_size=GRID))

@@ -142,6 +142,7 @@ def _joined(faces: Geometries, rank: IntArray, loose: BoolArray) -> IntArray:
         order = np.lexsort((out[street[j]], -np.round(shared, 6), i))
         found, first = np.unique(i[order], return_index=True)
         if not len(found):
+            out[left] = 0  # a lobe that hangs on a point of its parcel
             break
         out[left[found]] = out[street[j[order[first]]]]
         left = np.delete(left, found)

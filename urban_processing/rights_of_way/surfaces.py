@@ -44,10 +44,6 @@ class StreetSides:
     width: FloatArray
     rank: IntArray
 
-    def same(self, a: int, b: int) -> bool:
-        """Whether two segments have the same class and width."""
-        return bool(self.rank[a] == self.rank[b] and self.width[a] == self.width[b])
-
 
 @dataclass(frozen=True, eq=False)
 class Circles:
@@ -148,13 +144,17 @@ def _joints(sides: StreetSides) -> Circles:
     _, vertex = np.unique(place + 0.0, axis=0, return_inverse=True)
     order = np.lexsort((of, vertex.ravel(), sides.block[of]))
     at = np.column_stack([sides.block[of], vertex.ravel()])[order]
-    start = np.flatnonzero(np.r_[True, (np.diff(at, axis=0) != 0).any(axis=1)][: len(at)])
+    new = np.diff(at, axis=0, prepend=-1) != 0
+    start = np.append(np.flatnonzero(new.any(axis=1)), len(at))
+    # two of one kind that follow one another are one strip already
+    first, second = of[order[start[:-1]]], of[order[start[1:] - 1]]
+    joined = (np.diff(start) == 2) & (sides.rank[first] == sides.rank[second])
+    joined &= sides.width[first] == sides.width[second]
     angle = np.arctan2(toward[:, 1], toward[:, 0])
     chosen = []
-    for ends in np.split(order, start[1:]) if n else []:
+    for k in np.flatnonzero(~joined).tolist():
+        ends = order[start[k] : start[k + 1]]
         meeting = of[ends]
-        if len(ends) == 2 and sides.same(meeting[0], meeting[1]):
-            continue
         through = meeting[list(_straightest(angle[ends]))]
         widest = max(through.tolist(), key=lambda s: (sides.width[s], -sides.rank[s], -s))
         chosen.append((int(ends[0]), widest))
