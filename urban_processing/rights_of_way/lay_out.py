@@ -46,6 +46,7 @@ def lay_out_rights_of_way(layout: Layout) -> RightsOfWay:
     >>> from urban_processing.layout import layout_from_mesh
     >>> from urban_processing.mesh.build import mesh_from_polygons
     >>> from urban_processing.site import Frame
+    >>> from urban_processing.street_rules import StreetRules
     >>> mesh = mesh_from_polygons([shapely.box(0, 0, 100, 100)])
     >>> layout = layout_from_mesh(mesh, frame=Frame(), face_part=np.zeros(1), min_area=400)
     >>> rules = StreetRules(rim=20, corner_radius=0)
