@@ -37,6 +37,8 @@ _SELECTION = " Only the selected features, if the box is ticked."
 _LAYERS = {
     InputKind.BOUNDARY: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.CORNER_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.PARCEL_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
 }
 """Inputs that are layers, and their geometry."""
 

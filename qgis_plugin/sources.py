@@ -24,15 +24,22 @@ from qgis_plugin.crs import QgisCrs
 from qgis_plugin.definitions import CRS, input_of, is_given, parameter_name
 from qgis_plugin.feedback import stop_if_cancelled
 from qgis_plugin.geopackage import OGR
-from urban_processing.algorithms import Input, InputKind
+from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
+from urban_processing.algorithms.choices import layout_problems
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
+from urban_processing.intake.layouts import build_layout
 from urban_processing.intake.sites import build_site
+from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
 from urban_processing.site import Site
 
 if TYPE_CHECKING:
     from qgis_plugin.algorithm import SpecAlgorithm
+
+
+_SNAP = "snap"
+"""The parameter that edited layers are read with."""
 
 
 class Sources:
@@ -88,14 +95,34 @@ class Sources:
             corners=None if corners is None else self._features(corners),
         )
 
-    def _layout(self, item: Input) -> Any:
-        path = self.algorithm.parameterAsFile(
-            self.parameters, parameter_name(item.name), self.context
-        )
-        if not path:
-            return None
-        self.name = self.name or Path(path).stem
-        return read_layout(path, library=OGR)
+    def _layout(self, item: Input) -> Layout | None:
+        """Read a layout, from its file or from two layers."""
+        spec = self.algorithm.spec
+        names = [i.name for i in spec.inputs if is_given(self.parameters, parameter_name(i.name))]
+        problems = layout_problems(spec, names, lambda name: f"“{_label(spec, name)}”")
+        if problems:
+            raise BoundaryError(problems)
+        snap = None
+        if any(field.name == _SNAP for field in spec.params.fields()):
+            snap = self.algorithm.parameterAsDouble(
+                self.parameters, parameter_name(_SNAP), self.context
+            )
+        if item.name in names:
+            path = self.algorithm.parameterAsFile(
+                self.parameters, parameter_name(item.name), self.context
+            )
+            self.name = self.name or Path(path).stem
+            return read_layout(path, library=OGR, snap=snap)
+        found = []
+        for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
+            layer = input_of(spec, kind)
+            features = None if layer is None else self._features(layer)
+            if features is None:
+                return None
+            found.append(features)
+        self.name = self.name or found[0].name
+        crs = QgisCrs(self.context.transformContext())
+        return build_layout(*found, library=crs, snap=snap or 0.0)
 
     def _features(self, item: Input) -> Features[QgsCoordinateReferenceSystem] | None:
         """Read a layer, or the features of it that are selected; None where none is given."""
@@ -148,6 +175,10 @@ class Sources:
             if given.flags & own:
                 return given.geometryCheck
         return self.context.invalidGeometryCheck()
+
+
+def _label(spec: AlgorithmSpec, name: str) -> str:
+    return next(item.label for item in spec.inputs if item.name == name)
 
 
 def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:

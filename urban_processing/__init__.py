@@ -16,28 +16,33 @@ from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from urban_processing import errors
-    from urban_processing.api import cogenerate
+    from urban_processing.api import cogenerate, optimize
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayout
     from urban_processing.params.cogenerate import CogenerateParams, Preset, StreetPattern
+    from urban_processing.params.optimize import OptimizeParams
 
 _HOME = {
     "CogenerateParams": "urban_processing.params.cogenerate",
     "GeoLayout": "urban_processing.io.frames",
+    "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.cogenerate",
     "StreetPattern": "urban_processing.params.cogenerate",
     "cogenerate": "urban_processing.api",
+    "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
 }
 
 __all__ = [
     "CogenerateParams",
     "GeoLayout",
+    "OptimizeParams",
     "Preset",
     "StreetPattern",
     "__version__",
     "cogenerate",
     "errors",
+    "optimize",
     "read_layout",
 ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from os import PathLike
 from typing import Any
 
 import numpy.typing as npt
@@ -10,9 +11,14 @@ import numpy.typing as npt
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.features import Source
+from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayout
+from urban_processing.io.layouts import read_layers
+from urban_processing.layout import Layout
 from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines import cogenerate as pipeline
+from urban_processing.pipelines import optimize as optimization
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
 
@@ -84,6 +90,75 @@ def cogenerate(
             stacklevel=2,
         )
     return GeoLayout(pipeline.cogenerate(site, params, progress))
+
+
+def optimize(
+    layout: GeoLayout | Layout | str | PathLike[str] | None = None,
+    *,
+    parcels: Source | None = None,
+    streets: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayout:
+    """Smooth the streets and parcel sides of a layout and make its parcels more regular.
+
+    Global optimization (Chen 2024, section 5): vertices move, parcels and streets stay what
+    they are.
+
+    Parameters
+    ----------
+    layout
+        A layout, or a layout file, whose parcels and streets may have been edited.
+    parcels, streets
+        Instead: polygons and lines, as files, GeoDataFrames or geometries.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `OptimizeParams`.
+
+    Returns
+    -------
+    GeoLayout
+        With each energy before and after in the results of its last step.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    References
+    ----------
+    Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> left, right = shapely.box(0, 0, 30, 40), shapely.box(30, 0, 60, 40)
+    >>> street = shapely.LineString([(0, 0), (60, 0)])
+    >>> layout = optimize(parcels=[left, right], streets=[street])
+    >>> [round(float(area)) for area in layout.parcels.area_m2]
+    [1200, 1200]
+    """
+    params = OptimizeParams.from_values(parameters)
+    given = _layout(layout, parcels, streets, params)
+    return GeoLayout(optimization.optimize(given, params, progress))
+
+
+def _layout(
+    layout: GeoLayout | Layout | str | PathLike[str] | None,
+    parcels: Source | None,
+    streets: Source | None,
+    params: OptimizeParams,
+) -> Layout:
+    if (layout is None) == (parcels is None) or (parcels is None) != (streets is None):
+        raise BoundaryError("Give a layout, or parcels and streets.")
+    if layout is None:
+        return read_layers(parcels, streets, snap=params.snap)
+    if isinstance(layout, GeoLayout):
+        return layout.layout
+    if isinstance(layout, Layout):
+        return layout
+    return read_layout(layout, snap=params.snap).layout
 
 
 def _site(boundary: Source | Site, **options: Any) -> Site:

@@ -33,7 +33,7 @@ class EdgeKind(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Step:
-    """One entry of a layout's provenance."""
+    """One entry of a layout's provenance; `results` are figures that the step has to tell."""
 
     algorithm: str
     parameters: Mapping[str, Any]
@@ -41,6 +41,7 @@ class Step:
     version: str
     input_sha256: str
     seconds: float
+    results: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -298,6 +298,7 @@ PROVENANCE = Layer(
         _text("version", "Version", "Version of the software."),
         _text("input_sha256", "Input hash", "SHA-256 of the input."),
         Column("seconds", ColumnType.REAL, "s", "Time that the step took.", "Seconds"),
+        _text("results", "Results", "Figures that the step has to tell, as JSON."),
         _PART_OR_ALL,
     ),
     "Provenance",

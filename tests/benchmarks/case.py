@@ -25,6 +25,7 @@ STAGES = {
     "holes": ("cut_through_holes",),
     "cuts": ("cut_level",),
     "streets": ("extend_streets", "prune_streets"),
+    "optimize": ("optimize_geometry",),
 }
 """Functions of the pipeline whose time is taken together."""
 

@@ -84,7 +84,7 @@ def quality(asked: argparse.Namespace) -> None:
 def growth(asked: argparse.Namespace) -> None:
     """Print the time by stage over several sizes, and the exponent of its growth."""
     boundaries = asked.boundaries if asked.boundaries != BOUNDARIES else ["wandsworth"]
-    stages = ["holes", "cuts", "streets", "cogenerate", "measure", "write"]
+    stages = ["holes", "cuts", "streets", "optimize", "cogenerate", "measure", "write"]
     for boundary, preset in itertools.product(boundaries, asked.presets):
         say(f"\n## Growth: {boundary}, pattern {asked.patterns[0]}, preset {preset}\n")
         say_row(["parcels", *(f"{stage} s" for stage in stages), "ms/parcel", "peak MiB"])

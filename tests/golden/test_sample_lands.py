@@ -7,12 +7,14 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+import shapely
 
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.layout import Layout
 from urban_processing.metrics import certificate, measure
-from urban_processing.params import CogenerateParams
+from urban_processing.params import CogenerateParams, OptimizeParams
 from urban_processing.pipelines.cogenerate import cogenerate
+from urban_processing.pipelines.optimize import optimize
 
 SMOOTH = ("rect", "triangle", "ellipse", "irregular_64ha", "wyoming", "sant_adria")
 NOTCHED = ("wandsworth", "islington", "schaan", "planken", "schellenberg", "mauren")
@@ -24,8 +26,10 @@ Find = Callable[[str], Path]
 
 
 @cache
-def laid_out(path: Path, parcels: int, pattern: str, preset: str = "recommended") -> Layout:
-    params = CogenerateParams(parcels=parcels, pattern=pattern, preset=preset)
+def laid_out(
+    path: Path, parcels: int, pattern: str, preset: str = "recommended", optimize: bool = True
+) -> Layout:
+    params = CogenerateParams(parcels=parcels, pattern=pattern, preset=preset, optimize=optimize)
     return cogenerate(read_boundary(path), params)
 
 
@@ -53,12 +57,30 @@ def test_quality_of_500_parcels(sample: Find, name: str) -> None:
     found = figures(laid_out(sample(name), 500, "loop"))
     smooth = name in SMOOTH
     assert found["quads_pct"] >= (99 if smooth else 96.5)
-    assert found["irregularity_mean"] <= (0.025 if smooth else 0.040)
+    assert found["irregularity_mean"] <= (0.015 if smooth else 0.030)
     assert found["irregular_pct"] <= (1 if smooth else 6.5 if name in IN_PARTS else 3.5)
-    assert found["junction_deviation_deg"] <= 5
+    assert found["junction_deviation_deg"] <= 2.5
     assert found["street_length_relative"] <= 0.65
     assert found["block_parcels_max"] <= 50
     assert found["parcels_per_street"] >= (7 if name in IN_PARTS else 10)
+
+
+@pytest.mark.parametrize("name", SMOOTH + NOTCHED)
+def test_optimization_makes_every_land_better(sample: Find, name: str) -> None:
+    before = laid_out(sample(name), 500, "loop", optimize=False)
+    after = optimize(before, OptimizeParams())
+    was, now = figures(before), figures(after)
+    assert now["irregularity_mean"] < was["irregularity_mean"]
+    assert now["junction_deviation_deg"] < was["junction_deviation_deg"]
+    assert now["irregular_pct"] <= was["irregular_pct"]
+    assert now["unreached"] == 0
+    # the rim keeps its shape
+    land = [
+        shapely.union_all(before.mesh.face_polygons()[before.face_part == part])
+        for part in range(int(before.face_part.max()) + 1)
+    ]
+    proof = certificate(after, land=land)
+    assert proof.holds, [(c.name, c.message) for c in proof.failures]
 
 
 @pytest.mark.parametrize("name", ["triangle", "islington", "schellenberg"])

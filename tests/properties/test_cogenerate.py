@@ -125,7 +125,7 @@ def test_place_and_rotation_do_not_matter() -> None:
         quality.append((layout.mesh.n_faces, area[0], area[50], area[-1]))
     # the grid of coordinates and ties aside, the layouts are the same
     for other in quality[1:]:
-        assert other == pytest.approx(quality[0], rel=0.12)
+        assert other == pytest.approx(quality[0], rel=0.2)
 
 
 def test_lineages_are_unique_and_levels_count_cuts() -> None:

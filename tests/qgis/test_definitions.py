@@ -15,11 +15,12 @@ from qgis.core import (
     QgsProcessingParameterDefinition,
     QgsProcessingParameterFeatureSink,
     QgsProcessingParameterFeatureSource,
+    QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
     QgsProcessingParameterNumber,
 )
 
-from urban_processing.algorithms import AlgorithmSpec, OutputKind, specs
+from urban_processing.algorithms import AlgorithmSpec, InputKind, OutputKind, specs
 from urban_processing.algorithms.json_schema import description
 from urban_processing.cli.options import command_parameters
 from urban_processing.params import ParamField
@@ -113,12 +114,25 @@ def limit(value: float) -> float | None:
     return None if abs(value) > FREE or abs(value) >= 2**31 - 1 else value
 
 
-def test_inputs_are_layers_of_the_right_kind(algorithm: Any) -> None:
-    boundary = algorithm.parameterDefinition("BOUNDARY")
-    assert isinstance(boundary, QgsProcessingParameterFeatureSource)
-    assert boundary.dataTypes() == [QgsProcessing.SourceType.TypeVectorPolygon]
-    corners = algorithm.parameterDefinition("CORNERS")
-    assert corners.dataTypes() == [QgsProcessing.SourceType.TypeVectorPoint]
+INPUTS = {
+    InputKind.BOUNDARY: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.CORNER_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.PARCEL_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
+}
+
+
+def test_inputs_are_layers_of_the_right_kind(algorithm: Any, spec: AlgorithmSpec) -> None:
+    optional = QgsProcessingParameterDefinition.Flag.FlagOptional
+    for item in spec.inputs:
+        asked = algorithm.parameterDefinition(item.name.upper())
+        assert bool(asked.flags() & optional) is not item.required
+        assert asked.description() == item.label
+        if item.kind is InputKind.LAYOUT:
+            assert isinstance(asked, QgsProcessingParameterFile)
+        else:
+            assert isinstance(asked, QgsProcessingParameterFeatureSource)
+            assert asked.dataTypes() == [INPUTS[item.kind]]
 
 
 def test_results_are_sinks_and_files_and_all_optional(algorithm: Any) -> None:

@@ -104,10 +104,10 @@ def test_help_shows_every_parameter_with_unit_limits_and_default(spec: Algorithm
             note += [f"{shown['minimum']:g}to{shown['maximum']:g}"]
         elif "minimum" in shown:
             note += [f"atleast{shown['minimum']:g}"]
-        if shown["default"] is not None:
-            words = {True: "yes", False: "no"} if shown.get("type") == "boolean" else {}
-            default = words.get(shown["default"], shown["default"])
-            note += [f"default{default}".removesuffix(".0")]
+        if isinstance(shown["default"], bool):
+            note += ["defaultyes" if shown["default"] else "defaultno"]
+        elif shown["default"] is not None:
+            note += [f"default{shown['default']}".removesuffix(".0")]
         assert f"[{';'.join(note)}]" in text if note else True
 
 

@@ -5,14 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from urban_processing.algorithms.spec import (
-    AlgorithmSpec,
-    Estimate,
-    Input,
-    InputKind,
-    Output,
-    OutputKind,
-)
+from urban_processing.algorithms.outputs import LAYOUT_OUTPUTS
+from urban_processing.algorithms.spec import AlgorithmSpec, Estimate, Input, InputKind
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.progress import Progress
 
@@ -40,7 +34,8 @@ COGENERATE = AlgorithmSpec(
         "The land is cut in two again and again, along streamlines of a cross field that follows "
         "its boundary, until a parcel cannot be cut without going below the smallest area. After "
         "each level of cuts, streets are added along parcel boundaries so that every parcel is "
-        "reached and the network stays connected.\n\n"
+        "reached and the network stays connected. In the end the geometry is optimized: streets "
+        "and parcel sides become smoother, parcels and junctions more regular.\n\n"
         "Each connected part of the land gets a layout and a network of its own. Holes stay "
         "empty. The rim of the land is street."
     ),
@@ -61,30 +56,12 @@ COGENERATE = AlgorithmSpec(
             required=False,
         ),
     ),
-    outputs=(
-        Output(
-            name="output",
-            kind=OutputKind.LAYOUT,
-            label="Layout file",
-            help="The layout: a GeoPackage with parcels, streets, junctions, metrics and styles.",
-            required=True,
-        ),
-        Output(
-            name="plot", kind=OutputKind.MAP, label="Map", help="A map of the layout.", of="output"
-        ),
-        Output(
-            name="export",
-            kind=OutputKind.EXPORT,
-            label="Plain files",
-            help="A folder for one plain file of each layer.",
-            of="output",
-        ),
-    ),
+    outputs=LAYOUT_OUTPUTS,
     run=_run,
     estimate=_estimate,
     references=(
         "Z. Chen, P. Song and F. P. Ortner (2024). Hierarchical co-generation of parcels and "
-        "streets in urban modeling. Computer Graphics Forum 43(2). Sections 3, 4 and 6.",
+        "streets in urban modeling. Computer Graphics Forum 43(2). Sections 3 to 6.",
         "Y.-L. Yang, J. Wang, E. Vouga and P. Wonka (2013). Urban pattern: layout design by "
         "hierarchical domain splitting. ACM Transactions on Graphics 32(6). Section 5.",
     ),

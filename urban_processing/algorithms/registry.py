@@ -5,10 +5,11 @@ from __future__ import annotations
 import difflib
 
 from urban_processing.algorithms.cogenerate import COGENERATE
+from urban_processing.algorithms.optimize import OPTIMIZE
 from urban_processing.algorithms.spec import AlgorithmSpec
 from urban_processing.errors import ParameterError
 
-_SPECS = (COGENERATE,)
+_SPECS = (COGENERATE, OPTIMIZE)
 
 
 def specs() -> tuple[AlgorithmSpec, ...]:

@@ -24,7 +24,12 @@ class InputKind(enum.StrEnum):
     """Points on the boundary that count as corners of the land; they become a part of the
     `Site` of the boundary, not a value of their own."""
     LAYOUT = "layout"
-    """A layout made before; handed over as a `Layout`."""
+    """A layout made before, as a file; handed over as a `Layout`."""
+    PARCEL_LAYER = "parcel layer"
+    """Polygons of parcels: with the streets they stand for the file of a layout, and are handed
+    over in its place."""
+    STREET_LAYER = "street layer"
+    """Lines of streets that belong to a layer of parcels."""
 
 
 class OutputKind(enum.StrEnum):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from urban_processing.algorithms.choices import layout_problems
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
 from urban_processing.cli import stores
 from urban_processing.errors import BoundaryError, UrbanError
@@ -41,29 +42,73 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
     problems += _output_problems(spec, given)
     inputs: dict[str, Any] = {}
     for item in spec.inputs:
-        if item.kind is not InputKind.CORNER_POINTS:
-            inputs[item.name] = _read(spec, item, given, problems)
+        if item.kind is InputKind.BOUNDARY:
+            inputs[item.name] = _read_boundary(spec, item, given, problems)
+        elif item.kind is InputKind.LAYOUT:
+            inputs[item.name] = _read_layout(spec, item, given, problems)
     if problems:
         raise BadCallError(problems)
     return Call(inputs, spec.params.from_values(values))
 
 
-def _read(spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]) -> Any:
-    """Read one input; None where it was not given or is added to `problems`."""
+def _read_boundary(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read the land; None where it was not given or is added to `problems`."""
     if given[item.name] is None and not item.required:
         return None
     try:
-        if item.kind is InputKind.BOUNDARY:
-            return _boundary(spec, item, given, problems)
-        if given[item.name] is None:
-            problems.append(f"Give {option_name(item.name).upper()}, {_lower_first(item.help)}")
-            return None
-        from urban_processing.io.files import read_layout
-
-        return read_layout(given[item.name]).layout
+        return _boundary(spec, item, given, problems)
     except BoundaryError as error:
         problems += error.problems
         return None
+
+
+def _read_layout(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read a layout, from its file or from two layers; None where that failed."""
+    names = [i.name for i in spec.inputs if given[i.name] is not None]
+    wrong = layout_problems(spec, names, lambda name: _called(spec, name))
+    if not wrong and given[item.name] is None and item.required:
+        wrong = [f"Give {option_name(item.name).upper()}, {_lower_first(item.help)}"]
+    problems += wrong
+    if wrong or not names:
+        return None
+    snap = _snap(spec, given)
+    try:
+        if given[item.name] is not None:
+            from urban_processing.io.files import read_layout
+
+            return read_layout(given[item.name], snap=snap).layout
+        from urban_processing.io.layouts import read_layers
+
+        parcels, streets = (
+            next(given[i.name] for i in spec.inputs if i.kind is kind)
+            for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER)
+        )
+        return read_layers(parcels, streets, snap=snap or 0.0)
+    except UrbanError as error:
+        problems += error.problems
+        return None
+
+
+def _snap(spec: AlgorithmSpec, given: Mapping[str, Any]) -> float | None:
+    """Tolerance with which edited layers are read, the default where it is no number.
+
+    None where an algorithm takes no edited layers.
+    """
+    if "snap" not in given:
+        return None
+    values = {} if given["snap"] is None else {"snap": given["snap"]}
+    usable = {} if spec.params.problems_with(values) else values
+    return float(spec.params.from_values(usable).as_dict()["snap"])
+
+
+def _called(spec: AlgorithmSpec, name: str) -> str:
+    """Name of an input on the command line."""
+    kind = next(item.kind for item in spec.inputs if item.name == name)
+    return option_name(name).upper() if kind is InputKind.LAYOUT else f"--{option_name(name)}"
 
 
 def _boundary(

@@ -47,8 +47,16 @@ def write_layout(
     return files.write_layout(written, path, library=PYOGRIO, overwrite=overwrite)
 
 
-def read_layout(path: str | PathLike[str]) -> GeoLayout:
+def read_layout(path: str | PathLike[str], *, snap: float | None = None) -> GeoLayout:
     """Read a layout file; the layout is the one that was written.
+
+    Parameters
+    ----------
+    path
+        The file.
+    snap
+        Where it is given, parcels and streets that were edited and do not fit together any more
+        are fitted within this many metres, and the issues say what that changed.
 
     Raises
     ------
@@ -57,4 +65,4 @@ def read_layout(path: str | PathLike[str]) -> GeoLayout:
     TopologyError
         If its parcels or streets were changed so that they no longer fit together.
     """
-    return GeoLayout(files.read_layout(path, library=PYOGRIO))
+    return GeoLayout(files.read_layout(path, library=PYOGRIO, snap=snap))

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.errors import BoundaryError, OutputError, TopologyError
+from urban_processing.assembly import assemble_layout
+from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
 from urban_processing.layout import Layout, Step
 from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
 from urban_processing.metrics.tables import Table, layout_tables
@@ -107,8 +108,20 @@ def timeless(layout: Layout) -> Layout:
     return layout.replace(history=tuple(steps))
 
 
-def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:
+def read_layout(
+    path: str | PathLike[str], *, library: LayerLibrary, snap: float | None = None
+) -> Layout:
     """Read a layout file; the layout is the one that was written.
+
+    Parameters
+    ----------
+    path
+        The file.
+    library
+        What reads the layers.
+    snap
+        Where it is given, parcels and streets that were edited and do not fit together any more
+        are fitted within this many metres, and the issues say what that changed.
 
     Raises
     ------
@@ -121,6 +134,17 @@ def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:
     state = _read_state(source)
     x, y = state["origin"]
     file = _File(source, Frame(state["crs"], (float(x), float(y))), library)
+    try:
+        return _read_exactly(file, state)
+    except UrbanError:
+        if snap is None:
+            raise
+    return _read_edited(file, state, snap)
+
+
+def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
+    """Read the layout that was written."""
+    source = file.path
     try:
         parts = _read_parts(file, np.asarray(state["corners"], dtype=np.float64))
         issues = _read_issues(file)
@@ -139,8 +163,38 @@ def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:
                 *error.problems,
             ]
         ) from error
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise BoundaryError(f"{source} is damaged or was changed: {error}") from error
+
+
+def _read_edited(file: _File, state: Mapping[str, Any], snap: float) -> Layout:
+    """Read parcels and streets, whatever was done to them, and fit them together."""
+    try:
+        parcels, _ = file.layer(PARCELS.name)
+        streets, _ = file.layer(STREETS.name)
+        layout = assemble_layout(
+            _single(parcels, "Polygon"),
+            _single(streets, "LineString"),
+            frame=file.frame,
+            snap=snap,
+            min_area=state["min_area"],
+        )
+        note = Issue("layers_edited", "Parcels or streets of the file were edited.")
+        return layout.replace(
+            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
+            issues=(note, *layout.issues),
+            history=_read_history(file),
+            input_parts=_read_input(file),
+        )
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise BoundaryError(f"{file.path} cannot be read: {error}") from error
+
+
+def _single(geometry: npt.NDArray[np.object_], kind: str) -> npt.NDArray[np.object_]:
+    """Valid single geometries of a kind."""
+    present = geometry[~shapely.is_missing(geometry)]
+    parts = shapely.get_parts(shapely.make_valid(shapely.force_2d(present)))
+    return np.array([p for p in parts if p.geom_type == kind and not p.is_empty], dtype=object)
 
 
 @dataclass(frozen=True)
@@ -259,6 +313,7 @@ def _read_history(file: _File) -> tuple[Step, ...]:
             version=str(column["version"][i]),
             input_sha256=str(column["input_sha256"][i]),
             seconds=float(column["seconds"][i]),
+            results=json.loads(column["results"][i]),
         )
         for i in np.argsort(column["step"], kind="stable")
     )

@@ -17,6 +17,9 @@ STRAIGHT_ANGLE = np.radians(135.0)
 SIMPLIFY_SHARE = 0.02
 """Tolerance of the simplification of a reported polygon, relative to √area."""
 
+IRREGULAR = 0.1
+"""Parcels with a larger irregularity are called irregular (Chen 2024, Fig. 17)."""
+
 IRREGULARITY_WEIGHTS = (0.75, 0.25)
 """γ1 (angles) and γ2 (side lengths) of Chen 2024, Eq. 1."""
 

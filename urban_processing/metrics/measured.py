@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -54,6 +55,9 @@ class MeasuredLayout:
             *([("right-of-way", self._right_of_way())] if "net_parcels" in self.tables else []),
             ("certificate", self._certified()),
         ]
+        gained = self.layout.history[-1].results if self.layout.history else {}
+        if gained:
+            rows.append(("energies", _gains(gained)))
         codes = Counter(issue.code for issue in self.layout.issues)
         if codes:
             counted = ", ".join(f"{n} {code}" for code, n in sorted(codes.items()))
@@ -92,3 +96,16 @@ class MeasuredLayout:
         if self.certificate.holds:
             return "holds: exact partition, every parcel reached, one network in each part"
         return f"does NOT hold: {'; '.join(check.message for check in self.certificate.failures)}"
+
+
+def _gains(results: Mapping[str, float]) -> str:
+    """What an optimization gained: ``regularity 8.71 to 7.04, …; moved 3.1 m on average``."""
+    energies = []
+    for name, value in results.items():
+        energy = name.removeprefix("energy_").removesuffix("_before")
+        if name == f"energy_{energy}_before":
+            energies.append(f"{energy} {value:.3g} to {results[f'energy_{energy}_after']:.3g}")
+    moved = (
+        f"moved {results['moved_mean_m']:.3g} m on average, {results['moved_max_m']:.3g} m at most"
+    )
+    return f"{', '.join(energies)}; {moved}"

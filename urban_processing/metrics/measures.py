@@ -11,14 +11,12 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
 from urban_processing.metrics.registry import INTERIOR, METRICS
 from urban_processing.rights_of_way import RightsOfWay, lay_out_rights_of_way
 from urban_processing.streets.network import NodeKind, StreetNetwork, street_network
-
-IRREGULAR = 0.1
-"""Parcels with a larger irregularity are called irregular (Chen 2024, Fig. 17)."""
 
 SMALL_BLOCK = 3
 """Blocks of at most this many parcels count as small."""

@@ -252,6 +252,7 @@ def provenance_table(layout: Layout) -> Table:
             "version": [s.version for s in steps],
             "input_sha256": [s.input_sha256 for s in steps],
             "seconds": [s.seconds for s in steps],
+            "results": [json.dumps(dict(s.results)) for s in steps],
             "part": np.full(len(steps), np.nan),
         },
     )

@@ -2,10 +2,13 @@
 
 from urban_processing.params.base import Naming, Param, ParamField, Params, option_name
 from urban_processing.params.cogenerate import CogenerateParams, Preset, StreetPattern
+from urban_processing.params.optimize import Energy, OptimizeParams
 
 __all__ = [
     "CogenerateParams",
+    "Energy",
     "Naming",
+    "OptimizeParams",
     "Param",
     "ParamField",
     "Params",

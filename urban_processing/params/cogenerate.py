@@ -156,6 +156,14 @@ class CogenerateParams(Params):
             group=_WIDTHS,
         ),
     ] = StreetRules.turning_radius
+    optimize: Annotated[
+        bool,
+        Param(
+            label="Optimize the geometry",
+            help="Whether to smooth sides and streets and to make parcels and junctions more "
+            "regular in the end.",
+        ),
+    ] = True
     seed: Annotated[
         int,
         Param(

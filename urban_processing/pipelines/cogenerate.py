@@ -13,7 +13,9 @@ from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance, first_layout, simplify_site
 from urban_processing.layout import Layout, Step
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.optimization.optimize import optimize_geometry
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
@@ -41,8 +43,9 @@ SMALL_NET_SHARE = 0.25
 MOST_PARCELS = 2_000_000
 """More parcels than this are refused: the run would take hours and all the memory."""
 
-LEVELS_SHARE, RECUT_SHARE = 0.65, 0.8
-"""Share of the levels in the time of a run, and of cutting again in the time after them."""
+LEVELS_SHARE, RECUT_SHARE, PRUNED_SHARE = 0.6, 0.6, 0.7
+"""Share of the levels in the time of a run; of cutting again, and of the clean-up of streets, in
+the time after them."""
 
 SECONDS_PER_PARCEL = 1.8e-3
 """For the estimate that is given before a long run; one core of a common machine."""
@@ -132,7 +135,7 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         levels.update(min(done, 1.0) ** 3, _message(state))
         state = step(state)
     levels.update(1.0, _message(state))
-    layout = finish(state, progress.slice(LEVELS_SHARE, 1.0))
+    layout, results = finish(state, progress.slice(LEVELS_SHARE, 1.0))
     progress.update(1.0)
     entry = Step(
         algorithm="cogenerate",
@@ -141,6 +144,7 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         version=__version__,
         input_sha256=site.input_sha256,
         seconds=time.perf_counter() - started,
+        results=results,
     )
     return layout.replace(history=(*layout.history, entry))
 
@@ -238,8 +242,14 @@ def _levels_left(state: State) -> int:
     return max(1, math.ceil(math.log2(largest / (MEAN_OVER_MIN * state.min_area))))
 
 
-def finish(state: State, progress: Progress = SILENT) -> Layout:
-    """Cut irregular parcels again, clean up the streets, list what the user should know."""
+def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str, float]]:
+    """Cut irregular parcels again, clean up the streets, optimize, list what is to be known.
+
+    Returns
+    -------
+    layout, results
+        The layout, and what the optimization gained.
+    """
     params = state.params
     layout = state.layout
     if params.rules.recut:
@@ -251,25 +261,38 @@ def finish(state: State, progress: Progress = SILENT) -> Layout:
         )
     progress.update(RECUT_SHARE, "Cleaning up the streets")
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
-    layout = _with_floor(canonical(layout), state)
-    return layout.replace(issues=(*layout.issues, *findings(layout, params)))
+    layout = layout.replace(min_area=_promised_area(state, layout))
+    results: dict[str, float] = {}
+    if params.optimize:
+        optimized = optimize_geometry(
+            layout, OptimizeParams().weights, progress=progress.slice(PRUNED_SHARE, 1.0)
+        )
+        layout, results = optimized.layout, optimized.results()
+    layout = _with_net_floor(canonical(layout), params)
+    return layout.replace(issues=(*layout.issues, *findings(layout, params))), results
 
 
-def _with_floor(layout: Layout, state: State) -> Layout:
-    """The layout with the smallest area that it promises, gross or net, and keeps.
-
-    Where the number of parcels was given, the promise is the smallest area found.
-    """
-    net = layout.street_rules.net_min_area
-    if net:
-        floor = state.params.min_area or SMALL_NET_SHARE * _net_areas(layout).mean()
-        layout = canonical(keep_net_areas(layout, floor))
+def _promised_area(state: State, layout: Layout) -> float:
+    """Smallest gross area in m² that the layout promises: given, or that of its smallest parcel."""
     if state.quota is None:
-        return layout.replace(min_area=state.params.min_area)
-    area = _net_areas(layout) if net else layout.mesh.face_area
-    least = floor if net else state.min_area
-    found = float(area[area >= least].min(initial=np.inf))
-    return layout.replace(min_area=found if math.isfinite(found) else least)
+        return state.min_area
+    whole = layout.mesh.face_area >= state.min_area
+    return float(layout.mesh.face_area[whole].min()) if whole.any() else state.min_area
+
+
+def _with_net_floor(layout: Layout, params: CogenerateParams) -> Layout:
+    """The layout with a promise about net areas that it keeps, if the smallest area is one.
+
+    Where the number of parcels was given, the promise is the smallest net area found.
+    """
+    if not layout.street_rules.net_min_area:
+        return layout
+    floor = params.min_area or SMALL_NET_SHARE * float(_net_areas(layout).mean())
+    layout = canonical(keep_net_areas(layout, floor))
+    if params.min_area is None:
+        net = _net_areas(layout)
+        floor = float(net.min(initial=np.inf, where=net >= floor))
+    return layout.replace(min_area=floor if math.isfinite(floor) else layout.min_area)
 
 
 def _net_areas(layout: Layout) -> FloatArray:

@@ -17,6 +17,9 @@ from urban_processing.subdivision.cuts import AREA_ROUNDING
 COUNT_TOLERANCE = 0.03
 """The number of parcels is reached within this share."""
 
+SWALLOWED, CUT_OFF = "parcel_swallowed", "parcel_cut_off"
+"""Codes of what rights-of-way do to parcels."""
+
 CUT_OFF_M2 = 1.0
 """Pieces that the right-of-way cuts off parcels are listed from this area on."""
 
@@ -29,7 +32,7 @@ def findings(layout: Layout, params: CogenerateParams) -> list[Issue]:
     return [
         *_count(layout, params),
         *_sizes(layout),
-        *(_rights_of_way(layout) if layout.street_rules.laid_out else []),
+        *right_of_way_findings(layout),
         *_unreached(layout),
         *(_ends(layout) if params.pattern is StreetPattern.LOOP else []),
     ]
@@ -121,13 +124,15 @@ def _sizes(layout: Layout) -> list[Issue]:
     )
 
 
-def _rights_of_way(layout: Layout) -> list[Issue]:
-    """Parcels of which streets leave nothing, and those of which they cut pieces off."""
+def right_of_way_findings(layout: Layout) -> list[Issue]:
+    """List parcels of which streets leave nothing, and those of which they cut pieces off."""
+    if not layout.street_rules.laid_out:
+        return []
     streets, area = lay_out_rights_of_way(layout), layout.mesh.face_area
     swallowed = shapely.is_missing(streets.net)
     return _of_parcels(
         layout,
-        "parcel_swallowed",
+        SWALLOWED,
         "The right-of-way leaves {value:.1f} m² of this parcel, less than {limit:.1f} m²: it has "
         "no net parcel. Give narrower streets or a larger smallest area.",
         swallowed,
@@ -135,7 +140,7 @@ def _rights_of_way(layout: Layout) -> list[Issue]:
         SWALLOWED_SHARE * area,
     ) + _of_parcels(
         layout,
-        "parcel_cut_off",
+        CUT_OFF,
         "The right-of-way cuts {value:.1f} m² off this parcel, more than {limit:.1f} m²: they "
         "became right-of-way.",
         ~swallowed & (streets.cut_off > CUT_OFF_M2),

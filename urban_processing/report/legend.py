@@ -12,7 +12,7 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import Normal, withStroke
 
 from urban_processing.errors import ParameterError
-from urban_processing.metrics.measures import IRREGULAR
+from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.metrics.tables import Table
 from urban_processing.report.palette import (
     FAINT,

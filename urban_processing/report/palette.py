@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 
-from urban_processing.metrics.measures import IRREGULAR
+from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.metrics.tables import Table
 
 STRONGLY_IRREGULAR = 0.5

@@ -14,10 +14,13 @@ from scipy.sparse.csgraph import connected_components
 
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh, rank_cycles
+from urban_processing.mesh.straight import (
+    STRAIGHT_DEG,
+    go_on_straight,
+    included_angle,
+    pairs_at_nodes,
+)
 from urban_processing.street_rules import StreetClass
-
-STRAIGHT_DEG = 135.0
-"""Street edges whose included angle is larger belong to one street (Chen 2024, section 3)."""
 
 CHORD_M = 20.0
 """Longest chord over which the direction of a street at a junction is taken."""
@@ -32,6 +35,26 @@ class NodeKind(enum.IntEnum):
     """The arbitrary start of a ring that no other street meets."""
     END = 1
     JUNCTION = 2
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPoints:
+    """Where the directions of arms are taken: a point along each arm, between two vertices.
+
+    Parameters
+    ----------
+    node
+        (2K,) vertex that an arm leaves.
+    before, after
+        (2K,) the vertices between which its point lies.
+    share
+        (2K,) how far it lies from the one to the other, 0 to 1.
+    """
+
+    node: IntArray
+    before: IntArray
+    after: IntArray
+    share: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +94,12 @@ class StreetNetwork:
         (N,) mesh vertex, part and number of street edges of a node.
     node_kind
         (N,) `NodeKind`.
-    pair_node, pair_edges, pair_deviation
-        (P,), (P, 2), (P,) every two network edges that meet at a junction without one
-        continuing the other, and 90° less the acute angle between their chords, of
-        `CHORD_M` or the edge's length, in degrees.
+    pair_node, pair_arms, pair_deviation
+        (P,), (P, 2), (P,) every two arms that meet at a junction without one continuing the
+        other, and 90° less the acute angle between their chords, of `CHORD_M` or the edge's
+        length, in degrees. Arm ``k`` is the start of network edge ``k``, arm ``K + k`` its end.
+    arm_points
+        Ends of the chords.
     """
 
     half_edges: IntArray
@@ -93,8 +118,9 @@ class StreetNetwork:
     node_degree: IntArray
     node_kind: IntArray
     pair_node: IntArray
-    pair_edges: IntArray
+    pair_arms: IntArray
     pair_deviation: FloatArray
+    arm_points: ArmPoints
 
     @property
     def n_edges(self) -> int:
@@ -105,6 +131,11 @@ class StreetNetwork:
     def n_nodes(self) -> int:
         """Number of nodes, starts of rings included."""
         return len(self.node_vertex)
+
+    @cached_property
+    def pair_edges(self) -> IntArray:
+        """(P, 2) network edges of the arms of a pair."""
+        return self.pair_arms % max(self.n_edges, 1)
 
     @cached_property
     def street_rim(self) -> BoolArray:
@@ -195,11 +226,12 @@ def street_network(layout: Layout) -> StreetNetwork:
     level = np.asarray(layout.edge_level[half_edges >> 1], dtype=np.int64)
     edge_level = np.minimum.reduceat(level, offsets[:-1]) if n_edges else level
     pair_node, pair_arms, continues = _pair_arms(mesh, first, last, ends, kind)
-    chord = _chords(mesh, half_edges, offsets, start == end)
+    arm_points = _arm_points(mesh, half_edges, offsets, start == end)
+    chord = _chords(mesh, arm_points)
     pair_edges = pair_arms % max(n_edges, 1)
     meet = ~continues
     same = continues & (edge_rim[pair_edges[:, 0]] == edge_rim[pair_edges[:, 1]])
-    angle = _included(chord[pair_arms[meet, 0]], chord[pair_arms[meet, 1]])
+    angle = included_angle(chord[pair_arms[meet, 0]], chord[pair_arms[meet, 1]])
     edge_class = _classes(start, end, kind, degree, edge_rim, edge_level)
     return StreetNetwork(
         half_edges=half_edges,
@@ -218,7 +250,8 @@ def street_network(layout: Layout) -> StreetNetwork:
         node_degree=degree,
         node_kind=kind,
         pair_node=pair_node[meet],
-        pair_edges=pair_edges[meet],
+        pair_arms=pair_arms[meet],
+        arm_points=arm_points,
         pair_deviation=90.0 - np.minimum(angle, 180.0 - angle),
     )
 
@@ -257,7 +290,7 @@ def _continuation(mesh: PlanarMesh, half: IntArray, rim: BoolArray) -> IntArray:
     a, b = by_origin[twos], by_origin[twos + 1]
     rim_a, rim_b = rim[a >> 1], rim[b >> 1]
     d = _directions(mesh)
-    on = (rim_a == rim_b) & (rim_a | (_included(d[a], d[b]) > STRAIGHT_DEG))
+    on = (rim_a == rim_b) & (rim_a | (included_angle(d[a], d[b]) > STRAIGHT_DEG))
     out[a[on] ^ 1] = b[on]
     out[b[on] ^ 1] = a[on]
     return out
@@ -275,7 +308,7 @@ def _number_nodes(mesh: PlanarMesh, ends: IntArray, part: IntArray) -> tuple[Int
 def _is_smooth(mesh: PlanarMesh, first: IntArray, last: IntArray, rim: BoolArray) -> BoolArray:
     """Whether each network edge, if it is a ring, closes without a bend."""
     d = _directions(mesh)
-    return np.asarray(rim | (_included(d[first], d[last ^ 1]) > STRAIGHT_DEG))
+    return np.asarray(rim | (included_angle(d[first], d[last ^ 1]) > STRAIGHT_DEG))
 
 
 def _pair_arms(
@@ -288,33 +321,24 @@ def _pair_arms(
     """All pairs of arms at junctions, and which of them continue as one street.
 
     Arm ``k`` is the start of network edge ``k``, arm ``K + k`` its end.
+    arm_points
+        Ends of the chords.
     """
     arms = np.flatnonzero(node_kind[arm_node] == NodeKind.JUNCTION)
     arms = arms[np.lexsort((arms % max(len(first), 1), arm_node[arms]))]
     node = arm_node[arms]
-    beyond = np.searchsorted(node, node, side="right") - np.arange(len(arms)) - 1
-    i = np.repeat(np.arange(len(arms)), beyond)
-    j = i + 1 + np.arange(len(i)) - np.repeat(np.cumsum(beyond) - beyond, beyond)
-    pairs = np.column_stack([arms[i], arms[j]])
+    local = pairs_at_nodes(node)
+    pairs = arms[local]
     direction = _directions(mesh)[np.concatenate([first, last ^ 1])]
-    included = np.round(_included(direction[pairs[:, 0]], direction[pairs[:, 1]]), 6)
-    straight = np.flatnonzero(included > STRAIGHT_DEG)
-    straight = straight[np.lexsort((straight, -included[straight]))]
-    continues = np.zeros(len(pairs), dtype=bool)
-    taken = np.zeros(len(arm_node), dtype=bool)
-    for pair in straight.tolist():  # straightest first; each arm once
-        if not taken[pairs[pair]].any():
-            taken[pairs[pair]] = True
-            continues[pair] = True
-    return node[i], pairs, continues
+    angle = included_angle(direction[pairs[:, 0]], direction[pairs[:, 1]])
+    continues = go_on_straight(pairs, angle, n_arms=len(arm_node))
+    return node[local[:, 0]], pairs, continues
 
 
-def _chords(
+def _arm_points(
     mesh: PlanarMesh, half_edges: IntArray, offsets: IntArray, is_ring: BoolArray
-) -> ComplexArray:
-    """Direction of each arm, from its node to the point `CHORD_M` along the edge."""
-    n = len(offsets) - 1
-    z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
+) -> ArmPoints:
+    """The point `CHORD_M` along each arm, or the end of an edge that is shorter."""
     step = mesh.edge_length[half_edges >> 1]
     total = np.append(0.0, np.cumsum(step))
     low, high = total[offsets[:-1]], total[offsets[1:]]
@@ -323,12 +347,16 @@ def _chords(
     at = np.searchsorted(total, where, side="right") - 1
     at = np.clip(at, np.tile(offsets[:-1], 2), np.tile(offsets[1:], 2) - 1)
     h = half_edges[at]
+    ends = [mesh.origin[half_edges[offsets[:-1]]], mesh.target[half_edges[offsets[1:] - 1]]]
     share = np.clip((where - total[at]) / step[at], 0.0, 1.0)
-    point = z[mesh.origin[h]] + share * (z[mesh.target[h]] - z[mesh.origin[h]])
-    node = np.concatenate(
-        [z[mesh.origin[half_edges[offsets[:n]]]], z[mesh.target[half_edges[offsets[1:] - 1]]]]
-    )
-    return np.asarray(point - node)
+    return ArmPoints(np.concatenate(ends), mesh.origin[h], mesh.target[h], share)
+
+
+def _chords(mesh: PlanarMesh, points: ArmPoints) -> ComplexArray:
+    """Direction of each arm, from its node to its point."""
+    z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
+    before, after = z[points.before], z[points.after]
+    return np.asarray(before + points.share * (after - before) - z[points.node])
 
 
 def _classes(
@@ -390,8 +418,3 @@ def _directions(mesh: PlanarMesh) -> ComplexArray:
     """(2E,) vector of each half-edge."""
     d = mesh.xy[mesh.target] - mesh.xy[mesh.origin]
     return np.asarray(d[:, 0] + 1j * d[:, 1])
-
-
-def _included(a: ComplexArray, b: ComplexArray) -> FloatArray:
-    """Angle in degrees between directions that leave the same point: 180 where straight on."""
-    return np.asarray(np.abs(np.degrees(np.angle(a * np.conj(b)))))

@@ -23,11 +23,9 @@ from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.streamline import propose_cuts
 
-IRREGULAR = 0.1
-"""Parcels above this irregularity, and triangles, are cut again."""
-
 SIDES_COST = 0.05
-"""Cost, in irregularity, of a parcel that has not four sides."""
+"""Cost, in irregularity, of a parcel that has not four sides; parcels of at least this cost are
+cut again."""
 
 LEAST_GAIN = 0.01
 """Two parcels are changed only if they gain this much together."""
@@ -113,7 +111,7 @@ def _choose_pairs(layout: Layout, tried: set[frozenset[int]]) -> list[Pair]:
     taken: set[int] = set()
     pairs = []
     for face in np.argsort(-np.round(cost, 9), kind="stable").tolist():
-        if cost[face] < min(IRREGULAR, SIDES_COST):
+        if cost[face] < SIDES_COST:
             break
         for pair in by_face.get(face, []) if face not in taken else []:
             other = pair.goes if pair.keeps == face else pair.keeps

@@ -1,0 +1,59 @@
+"""Layouts in from layers of parcels and streets, whatever program made them."""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+from pathlib import Path
+
+import pyogrio
+from pyogrio.errors import DataSourceError
+
+from urban_processing.errors import BoundaryError
+from urban_processing.intake.layouts import build_layout
+from urban_processing.io.crs import PYPROJ
+from urban_processing.io.features import Source, read_features
+from urban_processing.layout import Layout
+from urban_processing.schema import PARCELS, STREETS
+
+
+def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
+    """Make a layout from a layer of parcels and one of streets; it promises what it has.
+
+    Parcels are snapped to each other and noded, streets are laid on the parcel boundaries
+    that they run along; the issues say what that changed.
+
+    Parameters
+    ----------
+    parcels
+        Polygons: a file, a GeoDataFrame, a GeoSeries or shapely geometries.
+    streets
+        Lines, likewise; in another CRS they are reprojected.
+    snap
+        Metres within which things fit.
+
+    Raises
+    ------
+    BoundaryError
+        With everything that is wrong with the layers.
+    """
+    problems: list[str] = []
+    found = []
+    for called, source, layer in (("Parcels", parcels, PARCELS), ("Streets", streets, STREETS)):
+        try:
+            found.append(read_features(source, layer=_layer_of(source, layer.name)))
+        except BoundaryError as error:
+            problems += [f"{called}: {problem}" for problem in error.problems]
+    if problems:
+        raise BoundaryError(problems)
+    return build_layout(*found, library=PYPROJ, snap=snap)
+
+
+def _layer_of(source: Source, name: str) -> str | None:
+    """Name of the layer to read: the one that a layout file has for it, where it is there."""
+    if not isinstance(source, str | PathLike) or not Path(source).is_file():
+        return None
+    try:
+        layers = pyogrio.list_layers(fspath(source))[:, 0].tolist()
+    except DataSourceError:
+        return None  # reading it says what is wrong
+    return name if name in layers else None
