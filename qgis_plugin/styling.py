@@ -17,12 +17,21 @@ from qgis.core import (
 from qgis.PyQt.QtXml import QDomDocument
 
 from urban_processing.layout_file.styles import layer_style
-from urban_processing.schema import ISSUES, JUNCTIONS, LAYERS, PARCELS, STREETS, Layer
+from urban_processing.schema import (
+    ISSUES,
+    JUNCTIONS,
+    LAYERS,
+    NET_PARCELS,
+    PARCELS,
+    RIGHT_OF_WAY,
+    STREETS,
+    Layer,
+)
 
 if TYPE_CHECKING:
     from qgis_plugin.provider import UrbanProcessingProvider
 
-_FROM_TOP = (ISSUES, JUNCTIONS, STREETS, PARCELS)
+_FROM_TOP = (ISSUES, JUNCTIONS, STREETS, RIGHT_OF_WAY, NET_PARCELS, PARCELS)
 """Layers from top to bottom; the others lie below in the order of the schema."""
 
 

@@ -5,19 +5,22 @@ from __future__ import annotations
 import dataclasses
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from urban_processing.hashing import splitmix64
 from urban_processing.mesh.corner_graph import CornerGraph, build_corner_graph
 from urban_processing.mesh.edit import Remap
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import Frame, Issue
+from urban_processing.street_rules import StreetRules
 
 
 class EdgeKind(enum.IntEnum):
@@ -72,6 +75,8 @@ class Layout:
         (F,) faces that are not to be cut.
     min_area
         The smallest parcel allowed, m².
+    street_rules
+        How wide streets are, and whether rights-of-way are laid out.
     corners_given
         Whether the user gave the corners of a freeform land (Chen 2024, section 3).
     issues
@@ -93,6 +98,7 @@ class Layout:
     face_lineage: npt.NDArray[np.uint64]
     face_locked: BoolArray
     min_area: float
+    street_rules: StreetRules = field(default_factory=StreetRules)
     corners_given: bool = False
     issues: tuple[Issue, ...] = ()
     history: tuple[Step, ...] = ()
@@ -154,6 +160,16 @@ class Layout:
         out = np.zeros(mesh.n_faces)
         np.add.at(out, mesh.face[h], mesh.edge_length[h >> 1])
         return out
+
+    @cached_property
+    def face_block(self) -> IntArray:
+        """(F,) block of each parcel: parcels joined across edges that are not street."""
+        sides = self.mesh.face.reshape(-1, 2)
+        joined = ~self.edge_street & (sides != OUTSIDE).all(axis=1)
+        a, b = sides[joined].T
+        n = self.mesh.n_faces
+        graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
     @cached_property
     def rim_parcel(self) -> BoolArray:

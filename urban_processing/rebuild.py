@@ -64,11 +64,24 @@ def canonical(layout: Layout) -> Layout:
         corners=mesh.xy[layout.vertex_corner],
     )
     rebuilt = rebuild_layout(parts, frame=layout.frame, min_area=layout.min_area)
+    if _same_numbering(rebuilt, layout):
+        return layout
     return rebuilt.replace(
+        street_rules=layout.street_rules,
         corners_given=layout.corners_given,
         issues=layout.issues,
         history=layout.history,
         input_parts=layout.input_parts,
+    )
+
+
+def _same_numbering(a: Layout, b: Layout) -> bool:
+    return all(
+        np.array_equal(getattr(a.mesh, name), getattr(b.mesh, name))
+        for name in ("xy", "origin", "next", "face")
+    ) and all(
+        np.array_equal(getattr(a, name), getattr(b, name))
+        for name in ("vertex_corner", "edge_street", "edge_kind", "edge_level")
     )
 
 

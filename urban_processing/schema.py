@@ -243,15 +243,21 @@ INPUT_BOUNDARY = Layer("input_boundary", GeometryType.POLYGON, (_PART, _AREA), "
 
 OBSTACLES = Layer("obstacles", GeometryType.POLYGON, (_PART, _AREA), "Obstacles")
 
+_TRUE_AREA = _real("area_m2", "Area", "Area.", unit="m²")
+
 RIGHT_OF_WAY = Layer(
     "right_of_way",
     GeometryType.POLYGON,
-    (_text("class", "Class", "Class of the streets that the surface belongs to."), _PART, _AREA),
+    (
+        _text("class", "Class", "Class of its streets: rim, fixed, collector, local, cul_de_sac."),
+        _PART,
+        _TRUE_AREA,
+    ),
     "Right-of-way",
 )
 
 NET_PARCELS = Layer(
-    "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, _PART, _AREA), "Parcels less right-of-way"
+    "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, _PART, _TRUE_AREA), "Net parcels"
 )
 
 ISSUES = Layer(
@@ -313,9 +319,7 @@ LAYERS: tuple[Layer, ...] = (
 )
 """All layers, in the order in which a file lists them."""
 
-LAID_OUT: tuple[Layer, ...] = tuple(
-    layer for layer in LAYERS if layer not in (OBSTACLES, RIGHT_OF_WAY, NET_PARCELS)
-)
+LAID_OUT: tuple[Layer, ...] = tuple(layer for layer in LAYERS if layer is not OBSTACLES)
 """Layers that a layout can have at present."""
 
 _BY_NAME = {layer.name: layer for layer in LAYERS}

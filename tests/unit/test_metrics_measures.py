@@ -12,7 +12,7 @@ from grid_layouts import SIDE, boxes, cut_square, grid, layout_of
 
 from urban_processing import graphs
 from urban_processing.layout import Layout, Step
-from urban_processing.metrics.measures import LayoutMeasures, measure
+from urban_processing.metrics.measures import measure
 from urban_processing.metrics.registry import INTERIOR, METRICS
 
 
@@ -128,7 +128,7 @@ def test_blocks_agree_with_networkx() -> None:
     graph = graphs.parcel_graph(layout)
     graph.remove_edges_from([(a, b) for a, b, d in graph.edges(data=True) if d["street_length_m"]])
     blocks = {frozenset(c) for c in nx.connected_components(graph)}
-    label = LayoutMeasures(layout).parcel_block
+    label = layout.face_block
     found = {frozenset((np.flatnonzero(label == k) + 1).tolist()) for k in np.unique(label)}
     assert found == blocks
     assert len(found) == 4

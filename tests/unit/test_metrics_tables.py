@@ -22,12 +22,14 @@ from urban_processing.metrics.tables import (
 )
 from urban_processing.schema import LAID_OUT, LAYERS, ColumnType, GeometryType, layer
 from urban_processing.site import Issue
+from urban_processing.street_rules import StreetRules
 
 ORIGIN = (500_000.0, 5_700_000.0)
 
 
 def test_tables_follow_the_schema() -> None:
     layout = grid(3, 3, [(0, 1), (3, 1)], [(1, 1), (1, 2)], origin=ORIGIN).replace(
+        street_rules=StreetRules(laid_out=True),
         input_parts=(shapely.box(0, 0, 60, 60),),
         history=(Step("cogenerate", {"min_area": 400.0}, 7, "1.0", "ab", 0.5),),
         issues=(Issue("small", "A small part.", part=0, geometry=shapely.Point(1, 1)),),

@@ -64,6 +64,16 @@ class GeoLayout(MeasuredLayout):
         return self.frame("input_boundary")
 
     @property
+    def right_of_way(self) -> gpd.GeoDataFrame:
+        """Land that streets take, by class; empty where no rights-of-way are laid out."""
+        return self.frame("right_of_way")
+
+    @property
+    def net_parcels(self) -> gpd.GeoDataFrame:
+        """Parcels less right-of-way, indexed by parcel_id; empty where none is laid out."""
+        return self.frame("net_parcels").set_index("parcel_id")
+
+    @property
     def issues(self) -> gpd.GeoDataFrame:
         """What could not be done, and what one should know."""
         return self.frame("issues")

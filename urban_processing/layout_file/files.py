@@ -26,6 +26,7 @@ from urban_processing.paths import geopackage_problems
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.schema import INPUT_BOUNDARY, ISSUES, PARCELS, PROVENANCE, STREETS
 from urban_processing.site import FloatArray, Frame, Issue
+from urban_processing.street_rules import StreetRules
 
 FILE_FORMAT = 1
 """Number of the way in which layout files keep what the schema does not say."""
@@ -149,6 +150,7 @@ def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
         issues = _read_issues(file)
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
         return layout.replace(
+            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
             corners_given=state["corners_given"],
             history=_read_history(file),
             input_parts=_read_input(file),
@@ -179,6 +181,7 @@ def _read_edited(file: _File, state: Mapping[str, Any], snap: float) -> Layout:
         )
         note = Issue("layers_edited", "Parcels or streets of the file were edited.")
         return layout.replace(
+            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
             issues=(note, *layout.issues),
             history=_read_history(file),
             input_parts=_read_input(file),
@@ -235,6 +238,7 @@ def _state(layout: Layout) -> str:
             "min_area": layout.min_area,
             "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
             "corners_given": layout.corners_given,
+            "street_rules": layout.street_rules.as_dict(),
         }
     )
 

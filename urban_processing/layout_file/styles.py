@@ -16,6 +16,7 @@ _METRES, _MILLIMETRES = "RenderMetersInMapUnits", "MM"
 
 _PAPER = "246,244,238,215"
 _OUTLINE = "140,134,124,255"
+_SURFACE = "217,213,203,255"
 _TRIANGLE = "182,160,214,230"
 _REDS = ("247,200,186,230", "238,140,116,230", "214,69,56,235")
 _STREET, _CASING = "255,204,70,255", "133,102,26,255"
@@ -239,7 +240,9 @@ _RULES = {
         _Rule("Boundary as given", "", [_fill("", outline=_DARK, width=0.2, dash="dash")], "fill")
     ],
     "obstacles": lambda: [_Rule("Obstacle", "", [_fill("199,218,201,230")], "fill")],
-    "right_of_way": lambda: [_Rule("Right-of-way", "", [_fill(_STREET)], "fill")],
+    "right_of_way": lambda: [
+        _Rule("Right-of-way", "", [_fill(_SURFACE, outline=_SURFACE)], "fill")
+    ],
     "net_parcels": lambda: [_Rule("Net parcel", "", [_fill(_PAPER)], "fill")],
     "issues": _issues,
 }

@@ -14,13 +14,22 @@ from scipy.sparse.csgraph import connected_components
 from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.metrics.overlap import covered_share, find_overlaps, segments_of
+from urban_processing.metrics.overlap import (
+    covered_share,
+    find_overlaps,
+    segments_of,
+    unmatched_segments,
+)
 from urban_processing.metrics.tables import (
     Table,
     boundary_table,
     issue_table,
+    net_parcel_table,
+    right_of_way_table,
     street_table,
 )
+from urban_processing.rights_of_way import lay_out_rights_of_way
+from urban_processing.site import GRID
 
 PARTITION_LIMIT = 1e-8
 """Largest symmetric difference of parcels and land, as a share of the land's area."""
@@ -85,6 +94,7 @@ def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None
         layout.mesh.face_polygons(layout.frame.origin),
     )
     boundary = boundary_table(layout)
+    streets = lay_out_rights_of_way(layout) if layout.street_rules.laid_out else None
     if land is not None:
         origin = np.asarray(layout.frame.origin)
         moved = shapely.transform(np.array(land, dtype=object), lambda xy: xy + origin)
@@ -95,6 +105,9 @@ def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None
         boundary,
         min_area=layout.min_area,
         issues=issue_table(layout),
+        right_of_way=None if streets is None else right_of_way_table(layout, streets),
+        net_parcels=None if streets is None else net_parcel_table(layout, streets),
+        net_min_area=layout.street_rules.net_min_area,
     )
 
 
@@ -105,6 +118,9 @@ def certify(
     *,
     min_area: float,
     issues: Table | None = None,
+    right_of_way: Table | None = None,
+    net_parcels: Table | None = None,
+    net_min_area: bool = False,
 ) -> Certificate:
     """Certify a layout by its layers, as they are in a file.
 
@@ -120,12 +136,17 @@ def certify(
     issues
         The `issues` layer. Where it is given, a parcel smaller than `min_area`, allowed if
         it is a whole part, must be listed there.
+    right_of_way, net_parcels
+        These layers, where rights-of-way are laid out.
+    net_min_area
+        Whether `min_area` is a promise about net parcels.
 
     Returns
     -------
     Certificate
         Checks `valid_polygons`, `coverage`, `land_covered`, `reached`, `streets_on_boundaries`,
-        `streets_connected` and `min_area`.
+        `streets_connected` and `min_area`, and with rights-of-way `right_of_way`: it and the
+        net parcels are the land, without gaps and overlaps.
     """
     ids = np.asarray(parcels["parcel_id"], dtype=np.int64)
     part = np.asarray(parcels["part"], dtype=np.int64)
@@ -135,16 +156,20 @@ def certify(
     coverage = _coverage(ids[usable], polygons[usable])
     # uniting a valid coverage is faster, and only right, where its boundaries match
     unite = shapely.coverage_union_all if coverage.holds else shapely.union_all
-    return Certificate(
-        (
-            _valid(ids, usable),
-            coverage,
-            _land_covered(polygons[usable], part[usable], land, land_part, unite),
-            *_street_checks(ids, polygons, lines, usable),
-            _connected(lines, np.asarray(streets["part"], dtype=np.int64), land_part, ids, part),
-            _large_enough(ids, part, polygons, min_area, issues),
-        )
+    area = shapely.area(polygons)
+    if net_min_area and net_parcels is not None:
+        area = _net_areas(ids, net_parcels)
+    checks = (
+        _valid(ids, usable),
+        coverage,
+        _land_covered(polygons[usable], part[usable], land, land_part, unite),
+        *_street_checks(ids, polygons, lines, usable),
+        _connected(lines, np.asarray(streets["part"], dtype=np.int64), land_part, ids, part),
+        _large_enough(ids, part, area, min_area, issues),
     )
+    if right_of_way is None or net_parcels is None:
+        return Certificate(checks)
+    return Certificate((*checks, _right_of_way(right_of_way, net_parcels, boundary)))
 
 
 def _geometry(table: Table) -> npt.NDArray[np.object_]:
@@ -207,6 +232,45 @@ def _land_covered(
         PARTITION_LIMIT,
         "of the land's area in gaps, overlaps and overhangs of the parcels",
         np.empty(0, dtype=np.int64),
+    )
+
+
+def _net_areas(ids: IntArray, net_parcels: Table) -> FloatArray:
+    """(F,) net area of each parcel, 0 where it has no net parcel."""
+    of = {int(i): k for k, i in enumerate(ids.tolist())}
+    out = np.zeros(len(ids))
+    area = shapely.area(_geometry(net_parcels)).tolist()
+    for parcel, value in zip(net_parcels["parcel_id"].tolist(), area, strict=True):
+        out[of[parcel]] += value
+    return out
+
+
+def _right_of_way(right_of_way: Table, net_parcels: Table, boundary: Table) -> Check:
+    """Right-of-way and net parcels are the land: valid, fitting together, without gaps.
+
+    What is left of their outlines where those that run in opposite directions cancel each
+    other has to be the outline of the land: then they cover each place of it once.
+    """
+    streets, net, land = _shift_to_origin(_geometry(right_of_way), net_parcels, boundary)
+    polygons = np.concatenate([streets, net])
+    usable = _usable(polygons)
+    left, rim = unmatched_segments(polygons[usable]), segments_of(land)
+    on_rim = covered_share(find_overlaps(left, rim, SNAP_M), len(left.line))
+    off = (1.0 - on_rim) * left.length > 2.0 * SNAP_M
+    bad = np.unique(np.append(np.flatnonzero(~usable), np.flatnonzero(usable)[left.line[off]]))
+    whole = float(shapely.area(land).sum())
+    missing = abs(float(shapely.area(polygons[usable]).sum()) - whole) / whole
+    # where it meets a rim that is no street, right-of-way has a corner on the grid, not on it
+    limit = PARTITION_LIMIT + GRID * float(rim.length.sum()) / whole
+    numbers = np.append(np.zeros(len(streets), dtype=np.int64), net_parcels["parcel_id"])
+    return Check(
+        "right_of_way",
+        not len(bad) and missing <= limit,
+        missing,
+        limit,
+        f"{len(bad)} surfaces of right-of-way and net parcels are invalid or do not fit together; "
+        f"their area differs from the land's by {missing:g} of it.",
+        tuple(numbers[bad[bad >= len(streets)]].tolist()),
     )
 
 
@@ -278,12 +342,12 @@ def _connected(
 def _large_enough(
     ids: IntArray,
     part: IntArray,
-    polygons: npt.NDArray[np.object_],
+    area: FloatArray,
     min_area: float,
     issues: Table | None,
 ) -> Check:
     """No parcel under `min_area`, unless it is a whole part and listed as an issue."""
-    area: FloatArray = np.nan_to_num(shapely.area(polygons))
+    area = np.nan_to_num(area)
     small = area < min_area * (1.0 - AREA_ROUNDING)
     _, inverse, count = np.unique(part, return_inverse=True, return_counts=True)
     excused = count[inverse] == 1

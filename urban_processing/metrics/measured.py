@@ -52,6 +52,7 @@ class MeasuredLayout:
             ("land", self._land()),
             ("parcels", self._parcels()),
             ("streets", self._streets()),
+            *([("right-of-way", self._right_of_way())] if "net_parcels" in self.tables else []),
             ("certificate", self._certified()),
         ]
         gained = self.layout.history[-1].results if self.layout.history else {}
@@ -70,8 +71,9 @@ class MeasuredLayout:
         return size + (f" in {parts} parts" if parts > 1 else "")
 
     def _parcels(self) -> str:
+        net = " net" if self.layout.street_rules.net_min_area else ""
         return (
-            f"{self.metric('parcels'):,.0f} of {self.metric('min_area_m2'):,.0f} m² or more, "
+            f"{self.metric('parcels'):,.0f} of {self.metric('min_area_m2'):,.0f} m²{net} or more, "
             f"{self.metric('quads_pct'):.1f} % with four sides, "
             f"mean irregularity {self.metric('irregularity_mean'):.3f}"
         )
@@ -81,6 +83,13 @@ class MeasuredLayout:
             f"{self.metric('streets'):,.0f}, {self.metric('street_length_m') / 1000:,.1f} km, "
             f"{self.metric('junctions'):,.0f} junctions, {self.metric('street_ends'):,.0f} ends "
             "(besides the rim)"
+        )
+
+    def _right_of_way(self) -> str:
+        return (
+            f"{self.metric('right_of_way_pct'):.1f} % of the land, net parcels of "
+            f"{self.metric('net_area_mean_m2'):,.0f} m² in the mean, "
+            f"{self.metric('net_area_min_m2'):,.0f} m² at least"
         )
 
     def _certified(self) -> str:

@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import shapely
 
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.corners import IRREGULAR
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
 from urban_processing.metrics.registry import INTERIOR, METRICS
+from urban_processing.rights_of_way import RightsOfWay, lay_out_rights_of_way
 from urban_processing.streets.block_length import BlockSides, longest_sides
 from urban_processing.streets.network import NodeKind, StreetNetwork, street_network
 
@@ -50,28 +50,32 @@ class LayoutMeasures:
         return street_network(self.layout)
 
     @cached_property
+    def rights_of_way(self) -> RightsOfWay | None:
+        """Right-of-way and net parcels, None where none are laid out."""
+        laid_out = self.layout.street_rules.laid_out
+        return lay_out_rights_of_way(self.layout) if laid_out else None
+
+    @cached_property
+    def net_area(self) -> FloatArray:
+        """(F,) area of the net parcels in m², NaN where no right-of-way is laid out."""
+        streets = self.rights_of_way
+        return np.full(self.layout.mesh.n_faces, np.nan) if streets is None else streets.net_area
+
+    @cached_property
+    def counted_area(self) -> FloatArray:
+        """(F,) area that the smallest area allowed is held against, gross or net."""
+        net = self.layout.street_rules.net_min_area
+        return self.net_area if net else self.layout.mesh.face_area
+
+    @cached_property
     def parts(self) -> IntArray:
         """Parts of the land that have parcels."""
         return np.unique(self.layout.face_part)
 
     @cached_property
-    def parcel_block(self) -> IntArray:
-        """(F,) block of a parcel: parcels joined across edges that are not street."""
-        mesh = self.layout.mesh
-        sides = mesh.face.reshape(-1, 2)
-        joined = ~self.layout.edge_street & (sides != OUTSIDE).all(axis=1)
-        a, b = sides[joined].T
-        n = mesh.n_faces
-        ones = np.ones(len(a), dtype=np.int8)
-        return np.asarray(
-            connected_components(coo_array((ones, (a, b)), shape=(n, n)), directed=False)[1],
-            dtype=np.int64,
-        )
-
-    @cached_property
     def block_sides(self) -> BlockSides:
         """The blocks' outlines, lengths and longest sides."""
-        return longest_sides(self.layout.mesh.face_polygons(), self.parcel_block)
+        return longest_sides(self.layout.mesh.face_polygons(), self.layout.face_block)
 
 
 def measure(layout: Layout, *, measures: LayoutMeasures | None = None) -> tuple[Metric, ...]:
@@ -129,6 +133,7 @@ def _values(known: LayoutMeasures, part: int | None) -> dict[str, float]:
         **{k + INTERIOR: v for k, v in _parcel_values(known, interior).items()},
         **_land_values(layout, inside),
         **_street_values(known, part, inside),
+        **_right_of_way_values(known, part),
         **_block_values(known, inside),
         "seconds": math.fsum(step.seconds for step in layout.history),
     }
@@ -139,6 +144,7 @@ def _parcel_values(known: LayoutMeasures, chosen: BoolArray) -> dict[str, float]
     n = int(chosen.sum())
     area, irregularity, sides = p.area[chosen], p.irregularity[chosen], p.sides[chosen]
     frontage, thinness = p.frontage[chosen], p.thinness[chosen]
+    net, counted = known.net_area[chosen], known.counted_area[chosen]
     corner_chosen = np.repeat(chosen, p.sides)
     mean_area = _mean(area)
     return {
@@ -167,9 +173,11 @@ def _parcel_values(known: LayoutMeasures, chosen: BoolArray) -> dict[str, float]
         "area_mean_m2": mean_area,
         "area_cv": float(area.std() / mean_area) if n else math.nan,
         "area_min_over_mean": _lowest(area) / mean_area,
-        "area_max_over_min_area": _highest(area) / smallest,
-        "above_2_min_area_pct": _percent(area > 2.0 * smallest),
-        "above_3_min_area": int((area > 3.0 * smallest).sum()),
+        "area_max_over_min_area": _highest(counted) / smallest,
+        "above_2_min_area_pct": _percent(counted > 2.0 * smallest),
+        "above_3_min_area": int((counted > 3.0 * smallest).sum()),
+        "net_area_mean_m2": _mean(net),
+        "net_area_min_m2": _lowest(net),
     }
 
 
@@ -228,8 +236,17 @@ def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -
     }
 
 
+def _right_of_way_values(known: LayoutMeasures, part: int | None) -> dict[str, float]:
+    streets = known.rights_of_way
+    if streets is None:
+        return {"right_of_way_m2": math.nan, "right_of_way_pct": math.nan}
+    taken = float(shapely.area(streets.polygons[_in_part(streets.part, part)]).sum())
+    land = known.layout.mesh.face_area[_in_part(known.layout.face_part, part)].sum()
+    return {"right_of_way_m2": taken, "right_of_way_pct": 100.0 * taken / float(land)}
+
+
 def _block_values(known: LayoutMeasures, inside: BoolArray) -> dict[str, float]:
-    block, size = np.unique(known.parcel_block[inside], return_counts=True)
+    block, size = np.unique(known.layout.face_block[inside], return_counts=True)
     length = known.block_sides.length[block]
     return {
         "blocks": len(size),

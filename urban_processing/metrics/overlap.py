@@ -47,6 +47,23 @@ def segments_of(geometries: npt.NDArray[np.object_]) -> Segments:
     return Segments(xy[within], xy[within + 1], owner[line[within]])
 
 
+def unmatched_segments(polygons: npt.NDArray[np.object_]) -> Segments:
+    """Segments of the rings of polygons that no other polygon has in the opposite direction.
+
+    Of polygons that share their vertices where they meet, and do not overlap, those are left
+    that bound all of them together.
+    """
+    segments = segments_of(np.asarray(shapely.orient_polygons(polygons), dtype=object))
+    ends = np.concatenate([segments.start, segments.end]) + 0.0  # no negative zeros
+    _, place = np.unique(ends[:, 0] + 1j * ends[:, 1], return_inverse=True)
+    start, end = place.reshape(2, -1)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    _, edge = np.unique(low * (place.max(initial=0) + 1) + high, return_inverse=True)
+    balance = np.bincount(edge, weights=np.where(start < end, 1.0, -1.0))
+    left = (balance[edge] != 0) | (np.bincount(edge)[edge] > 2)
+    return Segments(segments.start[left], segments.end[left], segments.line[left])
+
+
 def find_overlaps(first: Segments, second: Segments, tolerance: float) -> Overlaps:
     """All pairs that lie within `tolerance` metres of one another along a length."""
     tree = shapely.STRtree(_lines(second))

@@ -111,12 +111,19 @@ METRICS: tuple[MetricSpec, ...] = (
     _parcels("area_cv", "", "", "Standard deviation of the parcels' areas over their mean."),
     _parcels("area_min_over_mean", "", "", "Smallest area of a parcel over the mean."),
     _parcels(
-        "area_max_over_min_area", "", "", "Largest area of a parcel over the smallest allowed."
+        "area_max_over_min_area",
+        "",
+        "",
+        "Largest area of a parcel, net where that counts, over the smallest allowed.",
     ),
     _parcels(
         "above_2_min_area_pct", "%", "", "Share of parcels above twice the smallest area allowed."
     ),
     _parcels("above_3_min_area", "", "", "Parcels above three times the smallest area allowed."),
+    _parcels("net_area_mean_m2", "m²", "", "Mean area of the parcels less right-of-way."),
+    _parcels("net_area_min_m2", "m²", "", "Smallest area of a parcel less right-of-way."),
+    MetricSpec("right_of_way_m2", "m²", "", "Area of the right-of-way of all streets."),
+    MetricSpec("right_of_way_pct", "%", "", "Share of the land that is right-of-way."),
     MetricSpec(
         "street_share_pct", "%", "", "Length of interior street edges over all interior edges."
     ),

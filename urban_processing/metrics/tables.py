@@ -15,6 +15,8 @@ import shapely
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import OUTSIDE, FloatArray
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
+from urban_processing.rights_of_way import RightsOfWay
+from urban_processing.rights_of_way.lay_out import CLASSES
 from urban_processing.schema import ColumnType, layer
 from urban_processing.streets.network import NodeKind
 
@@ -55,7 +57,8 @@ class Table:
 def layout_tables(layout: Layout, *, measures: LayoutMeasures | None = None) -> dict[str, Table]:
     """Return all layers of the schema that a layout has, in the order of the schema.
 
-    `input_boundary` is left out where the polygons as given are not known.
+    `input_boundary` is left out where the polygons as given are not known, `right_of_way` and
+    `net_parcels` where no rights-of-way are laid out.
     """
     known = LayoutMeasures(layout) if measures is None else measures
     tables = {
@@ -66,6 +69,9 @@ def layout_tables(layout: Layout, *, measures: LayoutMeasures | None = None) -> 
     }
     if layout.input_parts:
         tables["input_boundary"] = input_boundary_table(layout)
+    if known.rights_of_way is not None:
+        tables["right_of_way"] = right_of_way_table(layout, known.rights_of_way)
+        tables["net_parcels"] = net_parcel_table(layout, known.rights_of_way)
     return {
         **tables,
         "issues": issue_table(layout),
@@ -85,7 +91,7 @@ def parcel_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
             "part": layout.face_part,
             "level": layout.face_level,
             "area_m2": p.area,
-            "net_area_m2": np.full(n, np.nan),
+            "net_area_m2": known.net_area,
             "sides": p.sides,
             "irregularity": p.irregularity,
             "frontage_m": p.frontage,
@@ -174,6 +180,33 @@ def input_boundary_table(layout: Layout) -> Table:
     """Return the polygons as given, before repair and simplification."""
     polygons = _shifted(layout.input_parts, layout)
     return _area_table("input_boundary", np.arange(len(polygons)), polygons)
+
+
+def right_of_way_table(layout: Layout, streets: RightsOfWay) -> Table:
+    """Return the right-of-way: one polygon for each connected piece of one class."""
+    return _table(
+        "right_of_way",
+        {
+            "class": [CLASSES[k].value for k in streets.rank.tolist()],
+            "part": streets.part,
+            "area_m2": shapely.area(streets.polygons),
+        },
+        _shifted(streets.polygons, layout),
+    )
+
+
+def net_parcel_table(layout: Layout, streets: RightsOfWay) -> Table:
+    """Return what is left of each parcel; those of which nothing is left are not in it."""
+    face = np.flatnonzero(~shapely.is_missing(streets.net))
+    return _table(
+        "net_parcels",
+        {
+            "parcel_id": face + 1,
+            "part": layout.face_part[face],
+            "area_m2": streets.net_area[face],
+        },
+        _shifted(streets.net[face], layout),
+    )
 
 
 def issue_table(layout: Layout) -> Table:

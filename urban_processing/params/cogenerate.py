@@ -8,6 +8,7 @@ from typing import Annotated
 
 from urban_processing.params.base import Naming, Param, Params
 from urban_processing.params.dimensions import unfit_dimensions
+from urban_processing.street_rules import StreetRules
 
 
 class StreetPattern(enum.StrEnum):
@@ -25,7 +26,19 @@ class Preset(enum.StrEnum):
     CHEN2024 = "chen2024"
 
 
+class MinAreaBasis(enum.StrEnum):
+    """Which area of a parcel the smallest area allowed is held against."""
+
+    GROSS = "gross"
+    NET = "net"
+
+
 _SIZE, _SHAPE, _STREETS, _DIMENSIONS = "Size", "Parcel shape", "Streets", "Dimensions"
+_WIDTHS = "Rights-of-way"
+
+
+LEAST_WIDTH = 1.0
+"""Smallest width in metres of a street inside the land."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +64,16 @@ class CogenerateParams(Params):
             group=_SIZE,
         ),
     ] = None
+    min_area_basis: Annotated[
+        MinAreaBasis,
+        Param(
+            label="Area that counts",
+            help="Whether the smallest area allowed is gross, to the centreline of streets, or "
+            "net, less right-of-way.",
+            labels={"gross": "Gross, to the centreline", "net": "Net, less right-of-way"},
+            group=_SIZE,
+        ),
+    ] = MinAreaBasis.GROSS
     pattern: Annotated[
         StreetPattern,
         Param(
@@ -65,6 +88,76 @@ class CogenerateParams(Params):
             },
         ),
     ] = StreetPattern.LOOP
+    right_of_way: Annotated[
+        bool,
+        Param(
+            label="Lay out rights-of-way",
+            help="Whether to cut the rights-of-way of streets out of the parcels: layers of "
+            "right-of-way and net parcels.",
+            group=_WIDTHS,
+        ),
+    ] = True
+    rim_width: Annotated[
+        float,
+        Param(
+            label="Width of rim streets",
+            help="Width of the right-of-way of streets on the rim of the land, which take its "
+            "inner half from the land; 0 where they lie outside.",
+            unit="m",
+            minimum=0,
+            group=_WIDTHS,
+        ),
+    ] = StreetRules.rim
+    collector_width: Annotated[
+        float,
+        Param(
+            label="Width of collectors",
+            help="Width of the right-of-way of collectors, the streets of the first levels.",
+            unit="m",
+            minimum=LEAST_WIDTH,
+            group=_WIDTHS,
+        ),
+    ] = StreetRules.collector
+    local_width: Annotated[
+        float,
+        Param(
+            label="Width of local streets",
+            help="Width of the right-of-way of local streets.",
+            unit="m",
+            minimum=LEAST_WIDTH,
+            group=_WIDTHS,
+        ),
+    ] = StreetRules.local
+    cul_de_sac_width: Annotated[
+        float,
+        Param(
+            label="Width of cul-de-sacs",
+            help="Width of the right-of-way of streets that lead to a street end alone.",
+            unit="m",
+            minimum=LEAST_WIDTH,
+            group=_WIDTHS,
+        ),
+    ] = StreetRules.cul_de_sac
+    corner_radius: Annotated[
+        float,
+        Param(
+            label="Radius of corners",
+            help="Radius of the corners of blocks at junctions; 0 leaves them sharp.",
+            unit="m",
+            minimum=0,
+            group=_WIDTHS,
+        ),
+    ] = StreetRules.corner_radius
+    turning_radius: Annotated[
+        float,
+        Param(
+            label="Radius of turning heads",
+            help="Radius of the turning heads at dead ends; 0 for none.",
+            unit="m",
+            minimum=0,
+            group=_WIDTHS,
+        ),
+    ] = StreetRules.turning_radius
     optimize: Annotated[
         bool,
         Param(
@@ -265,7 +358,7 @@ class CogenerateParams(Params):
     ] = 3
 
     def contradictions(self, called: Naming) -> list[str]:
-        """Return what contradicts: the two sizes, weights that are all zero, dimensions."""
+        """Return what contradicts: sizes, weights, dimensions, a net area without street."""
         problems = []
         area, number = called("min_area"), called("parcels")
         if self.min_area is None and self.parcels is None:
@@ -292,12 +385,31 @@ class CogenerateParams(Params):
                 least_frontage=self.least_frontage,
                 max_block_length=self.max_block_length,
             )
+        if self.min_area_basis is MinAreaBasis.NET and not self.right_of_way:
+            basis, streets = called("min_area_basis"), called("right_of_way")
+            problems.append(
+                f"{basis} net needs {streets}: without right-of-way there is no net area."
+            )
         return problems
 
     @property
     def frontage_limit(self) -> float:
         """Least frontage in metres where it is a hard limit, else 0."""
         return (self.least_frontage or 0.0) if self.hard_frontage else 0.0
+
+    @property
+    def street_rules(self) -> StreetRules:
+        """What streets are to be: widths, radii, whether rights-of-way are laid out."""
+        return StreetRules(
+            rim=self.rim_width,
+            collector=self.collector_width,
+            local=self.local_width,
+            cul_de_sac=self.cul_de_sac_width,
+            corner_radius=self.corner_radius,
+            turning_radius=self.turning_radius,
+            laid_out=self.right_of_way,
+            net_min_area=self.min_area_basis is MinAreaBasis.NET,
+        )
 
     @property
     def rules(self) -> Rules:

@@ -12,7 +12,7 @@ import numpy as np
 from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance, first_layout, simplify_site
 from urban_processing.layout import Layout, Step
-from urban_processing.mesh.planar import BoolArray, IntArray
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.optimization.optimize import optimize_geometry
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.params.optimize import OptimizeParams
@@ -21,6 +21,8 @@ from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
+from urban_processing.rights_of_way import lay_out_rights_of_way
+from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas
 from urban_processing.site import Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
@@ -36,6 +38,9 @@ MEAN_OVER_MIN = 1.37
 
 FLOOR_SHARE = 0.6
 """Smallest area allowed where the number of parcels is given, over their mean area."""
+
+SMALL_NET_SHARE = 0.25
+"""Net parcels under this share of the mean net area are joined where the number was given."""
 
 MOST_PARCELS = 2_000_000
 """More parcels than this are refused: the run would take hours and all the memory."""
@@ -133,7 +138,6 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         state = step(state)
     levels.update(1.0, _message(state))
     layout, results = finish(state, progress.slice(LEVELS_SHARE, 1.0))
-    layout = canonical(layout)
     progress.update(1.0)
     entry = Step(
         algorithm="cogenerate",
@@ -162,9 +166,10 @@ def estimate(site: Site, params: CogenerateParams) -> Estimate:
 
 
 def smallest_area(site: Site, params: CogenerateParams) -> float:
-    """Smallest area in m² that a cut may leave."""
+    """Smallest gross area in m² that a cut may leave."""
     if params.min_area is not None:
-        return params.min_area
+        rules = params.street_rules
+        return gross_floor(params.min_area, rules) if rules.net_min_area else params.min_area
     return FLOOR_SHARE * site.area / (params.parcels or 1)
 
 
@@ -177,6 +182,7 @@ def begin(site: Site, params: CogenerateParams) -> State:
         mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
         tolerance = default_tolerance(mean / MEAN_OVER_MIN)
     layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
+    layout = layout.replace(street_rules=params.street_rules)
     quota = None if params.parcels is None else shared_out(layout.mesh.face_area, params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)
     if quota is not None:
@@ -270,13 +276,33 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
         layout, results = optimized.layout, optimized.results()
         # what has moved may have become a little longer than wanted
         layout = divide_long_blocks(layout, params)
+    layout = _with_net_floor(canonical(layout), params)
     missed = (*findings(layout, params), *missed_dimensions(layout, params))
     return layout.replace(issues=(*layout.issues, *missed)), results
 
 
 def _promised_area(state: State, layout: Layout) -> float:
-    """Smallest area in m² that the layout promises: given, or that of its smallest parcel."""
+    """Smallest gross area in m² that the layout promises: given, or that of its smallest parcel."""
     if state.quota is None:
         return state.min_area
     whole = layout.mesh.face_area >= state.min_area
     return float(layout.mesh.face_area[whole].min()) if whole.any() else state.min_area
+
+
+def _with_net_floor(layout: Layout, params: CogenerateParams) -> Layout:
+    """The layout with a promise about net areas that it keeps, if the smallest area is one.
+
+    Where the number of parcels was given, the promise is the smallest net area found.
+    """
+    if not layout.street_rules.net_min_area:
+        return layout
+    floor = params.min_area or SMALL_NET_SHARE * float(_net_areas(layout).mean())
+    layout = canonical(keep_net_areas(layout, floor))
+    if params.min_area is None:
+        net = _net_areas(layout)
+        floor = float(net.min(initial=np.inf, where=net >= floor))
+    return layout.replace(min_area=floor if math.isfinite(floor) else layout.min_area)
+
+
+def _net_areas(layout: Layout) -> FloatArray:
+    return lay_out_rights_of_way(layout).net_area

@@ -108,7 +108,7 @@ def _long_blocks(layout: Layout, params: CogenerateParams) -> list[Issue]:
 
 def _long_block(layout: Layout, measures: LayoutMeasures, block: int, most: float) -> Issue:
     length = float(measures.block_sides.length[block])
-    first = int(np.flatnonzero(measures.parcel_block == block)[0])
+    first = int(np.flatnonzero(layout.face_block == block)[0])
     return Issue(
         code="block_too_long",
         message=f"This block is {length:.0f} m long, more than the limit of {most:.0f} m; no "

@@ -9,11 +9,19 @@ from urban_processing.access_rule import reached_frontage, unreached_parcels_of
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+from urban_processing.rights_of_way import lay_out_rights_of_way
+from urban_processing.rights_of_way.partition import SWALLOWED_SHARE
 from urban_processing.site import Issue
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 
 COUNT_TOLERANCE = 0.03
 """The number of parcels is reached within this share."""
+
+SWALLOWED, CUT_OFF = "parcel_swallowed", "parcel_cut_off"
+"""Codes of what rights-of-way do to parcels."""
+
+CUT_OFF_M2 = 1.0
+"""Pieces that the right-of-way cuts off parcels are listed from this area on."""
 
 VERY_LARGE = 3.0
 """Parcels above so many smallest areas are listed."""
@@ -24,6 +32,7 @@ def findings(layout: Layout, params: CogenerateParams) -> list[Issue]:
     return [
         *_count(layout, params),
         *_sizes(layout),
+        *right_of_way_findings(layout),
         *_unreached(layout),
         *(_ends(layout) if params.pattern is StreetPattern.LOOP else []),
     ]
@@ -77,25 +86,66 @@ def parcel_issues(
 
 def _sizes(layout: Layout) -> list[Issue]:
     """Parts too small for a parcel, and parcels that stayed very large."""
-    area = layout.mesh.face_area
+    area, which = layout.mesh.face_area, ""
+    if layout.street_rules.net_min_area:
+        area, which = lay_out_rights_of_way(layout).net_area, " net"
     least = np.full(len(area), layout.min_area)
     most = VERY_LARGE * least
+    small = area < least * (1.0 - AREA_ROUNDING)
+    alone = np.bincount(layout.face_part)[layout.face_part] == 1
+    return (
+        parcel_issues(
+            layout,
+            "part_below_min_area",
+            f"This part of the land ({{value:.0f}} m²{which}) is smaller than the smallest parcel "
+            "allowed ({limit:.0f} m²) and stays one parcel.",
+            small & alone,
+            area,
+            least,
+        )
+        + parcel_issues(
+            layout,
+            "parcel_below_min_area",
+            f"This parcel ({{value:.0f}} m²{which}) is smaller than the smallest allowed "
+            "({limit:.0f} m²): it cannot be joined with another without cutting off a street.",
+            small & ~alone,
+            area,
+            least,
+        )
+        + parcel_issues(
+            layout,
+            "parcel_not_cut",
+            f"No cut of this parcel ({{value:.0f}} m²{which}) leaves two simple halves that are "
+            "large enough; it is larger than {limit:.0f} m².",
+            area > most,
+            area,
+            most,
+        )
+    )
+
+
+def right_of_way_findings(layout: Layout) -> list[Issue]:
+    """List parcels of which streets leave nothing, and those of which they cut pieces off."""
+    if not layout.street_rules.laid_out:
+        return []
+    streets, area = lay_out_rights_of_way(layout), layout.mesh.face_area
+    swallowed = shapely.is_missing(streets.net)
     return parcel_issues(
         layout,
-        "part_below_min_area",
-        "This part of the land ({value:.0f} m²) is smaller than the smallest parcel allowed "
-        "({limit:.0f} m²) and stays one parcel.",
-        area < least * (1.0 - AREA_ROUNDING),
-        area,
-        least,
+        SWALLOWED,
+        "The right-of-way leaves {value:.1f} m² of this parcel, less than {limit:.1f} m²: it has "
+        "no net parcel. Give narrower streets or a larger smallest area.",
+        swallowed,
+        streets.cut_off,
+        SWALLOWED_SHARE * area,
     ) + parcel_issues(
         layout,
-        "parcel_not_cut",
-        "No cut of this parcel ({value:.0f} m²) leaves two simple halves that are large enough; "
-        "it is larger than {limit:.0f} m².",
-        area > most,
-        area,
-        most,
+        CUT_OFF,
+        "The right-of-way cuts {value:.1f} m² off this parcel, more than {limit:.1f} m²: they "
+        "became right-of-way.",
+        ~swallowed & (streets.cut_off > CUT_OFF_M2),
+        streets.cut_off,
+        np.full(len(area), CUT_OFF_M2),
     )
 
 

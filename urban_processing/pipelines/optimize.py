@@ -6,12 +6,17 @@ import dataclasses
 import hashlib
 import time
 
+import numpy as np
+
 from urban_processing.layout import Layout, Step
-from urban_processing.optimization.optimize import optimize_geometry
+from urban_processing.optimization.optimize import Optimized, optimize_geometry
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.pipelines.findings import CUT_OFF, SWALLOWED, right_of_way_findings
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
+from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.site import Issue
+from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.version import __version__
 
 
@@ -35,7 +40,7 @@ def optimize(layout: Layout, params: OptimizeParams, progress: Progress = SILENT
     started = time.perf_counter()
     if params.min_area is not None:
         layout = layout.replace(min_area=params.min_area)
-    optimized = optimize_geometry(layout, params.weights, progress=progress)
+    optimized = _optimized(layout, params, progress)
     after = optimized.layout.replace(issues=_moved(optimized.layout))
     entry = Step(
         algorithm="optimize",
@@ -49,15 +54,36 @@ def optimize(layout: Layout, params: OptimizeParams, progress: Progress = SILENT
     return canonical(after.replace(history=(*after.history, entry)))
 
 
+def _optimized(layout: Layout, params: OptimizeParams, progress: Progress) -> Optimized:
+    """Optimize; parcels whose net area would sink below a promise about it stay as they are."""
+    locked = layout.face_locked
+    while True:
+        optimized = optimize_geometry(
+            layout.replace(face_locked=locked), params.weights, progress=progress
+        )
+        after = optimized.layout.replace(face_locked=layout.face_locked)
+        optimized = dataclasses.replace(optimized, layout=after)
+        if not layout.street_rules.net_min_area:
+            return optimized
+        least = np.minimum(layout.min_area, lay_out_rights_of_way(layout).net_area)
+        sunk = lay_out_rights_of_way(after).net_area < least * (1.0 - AREA_ROUNDING)
+        if not sunk.any():
+            return optimized
+        # what stays may still lose a little to a junction that moves: then nothing moves
+        locked = locked | sunk if (sunk & ~locked).any() else np.ones_like(locked)
+
+
 def _moved(layout: Layout) -> tuple[Issue, ...]:
-    """The issues, those of parcels at their new outlines."""
+    """The issues, those of parcels at their new outlines, those of rights-of-way anew."""
     polygons = layout.mesh.face_polygons()
-    return tuple(
+    kept = tuple(
         issue
         if issue.parcel_id is None or not 1 <= issue.parcel_id <= len(polygons)
         else dataclasses.replace(issue, geometry=polygons[issue.parcel_id - 1])
         for issue in layout.issues
+        if issue.code not in (SWALLOWED, CUT_OFF)
     )
+    return (*kept, *right_of_way_findings(layout))
 
 
 def _digest(layout: Layout) -> str:

@@ -14,7 +14,15 @@ from matplotlib.patheffects import Normal, withStroke
 from urban_processing.errors import ParameterError
 from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.metrics.tables import Table
-from urban_processing.report.palette import FAINT, INK, IRREGULAR_RAMP, PARCEL, TRIANGLE, Scale
+from urban_processing.report.palette import (
+    FAINT,
+    INK,
+    IRREGULAR_RAMP,
+    PARCEL,
+    SURFACE,
+    TRIANGLE,
+    Scale,
+)
 from urban_processing.schema import PARCELS
 
 
@@ -89,6 +97,8 @@ def legend_entries(
             entries.append(_swatch(IRREGULAR_RAMP(0.6), f"{int(irregular.sum()):,} irregular"))
         if triangle.any():
             entries.append(_swatch(TRIANGLE, _counted(int(triangle.sum()), "triangle")))
+    if "right_of_way" in tables:
+        entries.append(_swatch(SURFACE, "Right-of-way"))
     cased = [withStroke(linewidth=4.4, foreground=casing), Normal()]
     entries.append(Line2D([], [], color=street, lw=3, label="Street", path_effects=cased))
     if n_ends:

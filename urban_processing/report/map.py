@@ -36,6 +36,7 @@ from urban_processing.report.palette import (
     PLAIN_CASING,
     PLAIN_STREET,
     STREET,
+    SURFACE,
     VALUE_RAMP,
     Scale,
     parcel_colours,
@@ -194,6 +195,8 @@ def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
     ax.axis("off")
     scale = _scale(ax, tables)
     _draw_parcels(ax, tables["parcels"], scale, colour_by)
+    if "right_of_way" in tables:
+        _draw_right_of_way(ax, tables["right_of_way"])
     _draw_rim(ax, tables["boundary"], scale)
     colours = (STREET, CASING) if colour_by is None else (PLAIN_STREET, PLAIN_CASING)
     _draw_streets(ax, tables["streets"], tables["junctions"], scale, colours)
@@ -230,6 +233,18 @@ def _draw_rim(ax: Axes, boundary: Table, scale: Scale) -> None:
             linewidths=1.8 * scale.outline,
             joinstyle="round",
             zorder=1.5,
+        )
+    )
+
+
+def _draw_right_of_way(ax: Axes, right_of_way: Table) -> None:
+    """Draw the land that streets take, true to scale, below the streets themselves."""
+    ax.add_collection(
+        PathCollection(
+            [_outline(polygon) for polygon in _geometry(right_of_way)],
+            facecolors=SURFACE,
+            edgecolors="none",
+            zorder=1.3,
         )
     )
 

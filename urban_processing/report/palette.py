@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 INK, FAINT = "#4a463f", "#8c8579"
 PARCEL, OUTLINE = "#f6f4ee", "#aaa396"
 TRIANGLE = "#b6a0d6"
+SURFACE = "#d9d5cb"
 IRREGULAR_RAMP = LinearSegmentedColormap.from_list("irregular", ["#f9dcd0", "#ee8f76", "#d0342c"])
 VALUE_RAMP = LinearSegmentedColormap.from_list(
     "value", ["#f7f3dc", "#b9dcc0", "#63b3bd", "#2f7aa8", "#2b4a86"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -21,33 +20,12 @@ from urban_processing.mesh.straight import (
     included_angle,
     pairs_at_nodes,
 )
+from urban_processing.street_rules import StreetClass
 
 CHORD_M = 20.0
 """Longest chord over which the direction of a street at a junction is taken."""
 
 ComplexArray = npt.NDArray[np.complex128]
-
-
-class StreetClass(enum.StrEnum):
-    """Class of a network edge."""
-
-    RIM = "rim"
-    FIXED = "fixed"
-    COLLECTOR = "collector"
-    LOCAL = "local"
-    CUL_DE_SAC = "cul_de_sac"
-
-
-WIDTH_M = MappingProxyType(
-    {
-        StreetClass.RIM: 16.0,
-        StreetClass.FIXED: 16.0,
-        StreetClass.COLLECTOR: 16.0,
-        StreetClass.LOCAL: 12.0,
-        StreetClass.CUL_DE_SAC: 10.0,
-    }
-)
-"""Nominal width of the right-of-way by class, in metres."""
 
 
 class NodeKind(enum.IntEnum):
@@ -104,6 +82,8 @@ class StreetNetwork:
         (K,) `StreetClass`: a *cul-de-sac* leads to nothing but a street end; a *collector* is
         another interior edge of the first half (rounded up) of the levels that have interior
         streets; the other interior edges are *local*.
+    edge_width
+        (K,) nominal width of the right-of-way in metres, that of the class.
     edge_street
         (K,) street that a network edge belongs to. At a node the straightest pair of edges
         continues as one street, then the straightest of the rest, while the included angle
@@ -131,6 +111,7 @@ class StreetNetwork:
     edge_level: IntArray
     edge_length: FloatArray
     edge_class: npt.NDArray[np.str_]
+    edge_width: FloatArray
     edge_street: IntArray
     node_vertex: IntArray
     node_part: IntArray
@@ -173,12 +154,6 @@ class StreetNetwork:
         """(S,) length of a street in metres."""
         length = np.bincount(self.edge_street, weights=self.edge_length)
         return np.asarray(length, dtype=np.float64)
-
-    @cached_property
-    def edge_width(self) -> FloatArray:
-        """(K,) nominal width of the right-of-way in metres."""
-        width = {c.value: w for c, w in WIDTH_M.items()}
-        return np.array([width[c] for c in self.edge_class.tolist()], dtype=np.float64)
 
     @cached_property
     def node_number(self) -> IntArray:
@@ -257,6 +232,7 @@ def street_network(layout: Layout) -> StreetNetwork:
     meet = ~continues
     same = continues & (edge_rim[pair_edges[:, 0]] == edge_rim[pair_edges[:, 1]])
     angle = included_angle(chord[pair_arms[meet, 0]], chord[pair_arms[meet, 1]])
+    edge_class = _classes(start, end, kind, degree, edge_rim, edge_level)
     return StreetNetwork(
         half_edges=half_edges,
         offsets=offsets,
@@ -266,7 +242,8 @@ def street_network(layout: Layout) -> StreetNetwork:
         edge_part=part[first >> 1],
         edge_level=edge_level,
         edge_length=_lengths(mesh, half_edges, offsets),
-        edge_class=_classes(start, end, kind, degree, edge_rim, edge_level),
+        edge_class=edge_class,
+        edge_width=_widths(layout, edge_class),
         edge_street=_components(n_edges, pair_edges[same]),
         node_vertex=node_vertex,
         node_part=node_part,
@@ -405,6 +382,12 @@ def _classes(
     out[np.isin(run, run[at_end])] = StreetClass.CUL_DE_SAC.value
     out[rim] = StreetClass.RIM.value
     return out
+
+
+def _widths(layout: Layout, edge_class: npt.NDArray[np.str_]) -> FloatArray:
+    """(K,) nominal width of each network edge by its class."""
+    width = layout.street_rules.width_m
+    return np.array([width[c] for c in edge_class.tolist()], dtype=np.float64)
 
 
 def _components(n: int, pairs: IntArray) -> IntArray:

@@ -41,7 +41,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class _Pair:
+class Pair:
     """Two neighbours, and the chain of half-edges between them with the first on its left."""
 
     keeps: int
@@ -86,37 +86,51 @@ def _costs(layout: Layout, params: CogenerateParams) -> FloatArray:
     return np.asarray(cost)
 
 
-def _choose_pairs(
-    layout: Layout, tried: set[frozenset[int]], params: CogenerateParams
-) -> list[_Pair]:
-    """Pair each offender, the worst first, with the neighbour along its longest side."""
+def joinable_pairs(layout: Layout) -> list[Pair]:
+    """Neighbours that can become one parcel, those with the longest common side first.
+
+    They are not locked, no street lies between them, and they have one side in common.
+    """
     graph = layout.corner_graph
-    cost = _costs(layout, params)
-    lineage = layout.face_lineage.tolist()
     left, right = graph.face[0::2], graph.face[1::2]
     inner = (left != OUTSIDE) & (right != OUTSIDE) & (left != right)
     inner &= ~layout.chain_street[0::2]
-    inner[inner] &= ~(layout.face_locked[left[inner]] | layout.face_locked[right[inner]])
+    barred = layout.face_locked | (layout.mesh.face_n_loops > 1)
+    inner[inner] &= ~(barred[left[inner]] | barred[right[inner]])
     usable = np.flatnonzero(inner & _only_contact(left, right))
-    by_face: dict[int, list[int]] = {}
-    for i in usable[np.argsort(-graph.length[2 * usable], kind="stable")].tolist():
-        by_face.setdefault(int(left[i]), []).append(i)
-        by_face.setdefault(int(right[i]), []).append(i)
+    return [
+        Pair(
+            int(left[i]),
+            int(right[i]),
+            tuple(graph.half_edges[graph.offsets[2 * i] : graph.offsets[2 * i + 1]].tolist()),
+        )
+        for i in usable[np.argsort(-graph.length[2 * usable], kind="stable")].tolist()
+    ]
+
+
+def _choose_pairs(
+    layout: Layout, tried: set[frozenset[int]], params: CogenerateParams
+) -> list[Pair]:
+    """Pair each offender, the worst first, with the neighbour along its longest side."""
+    cost = _costs(layout, params)
+    lineage = layout.face_lineage.tolist()
+    by_face: dict[int, list[Pair]] = {}
+    for pair in joinable_pairs(layout):
+        by_face.setdefault(pair.keeps, []).append(pair)
+        by_face.setdefault(pair.goes, []).append(pair)
     taken: set[int] = set()
     pairs = []
-    single = layout.mesh.face_n_loops == 1
     for face in np.argsort(-np.round(cost, 9), kind="stable").tolist():
         if cost[face] < SIDES_COST:
             break
-        for i in by_face.get(face, []) if face not in taken and single[face] else []:
-            other = int(right[i]) if left[i] == face else int(left[i])
+        for pair in by_face.get(face, []) if face not in taken else []:
+            other = pair.goes if pair.keeps == face else pair.keeps
             key = frozenset((lineage[face], lineage[other]))
-            if other in taken or key in tried or not single[other]:
+            if other in taken or key in tried:
                 continue
             tried.add(key)
             taken |= {face, other}
-            chain = graph.half_edges[graph.offsets[2 * i] : graph.offsets[2 * i + 1]]
-            pairs.append(_Pair(int(left[i]), int(right[i]), tuple(chain.tolist())))
+            pairs.append(pair)
             break
     return pairs
 
@@ -129,12 +143,12 @@ def _only_contact(left: IntArray, right: IntArray) -> BoolArray:
     return np.asarray(count[inverse.ravel()] == 1)
 
 
-def _recut(layout: Layout, pairs: list[_Pair], min_area: float, params: CogenerateParams) -> Layout:
+def _recut(layout: Layout, pairs: list[Pair], min_area: float, params: CogenerateParams) -> Layout:
     """Cut all pairs anew; those that do not gain are left out and the rest is done again."""
     before = _costs(layout, params)
     area = layout.mesh.face_area
     while pairs:
-        joined, parent = _joined(layout, pairs)
+        joined, parent = join_pairs(layout, pairs)
         faces = np.searchsorted(parent, [p.keeps for p in pairs])
         parcels = parcel_rings(joined, faces)
         ranked = propose_cuts(
@@ -153,7 +167,7 @@ def _recut(layout: Layout, pairs: list[_Pair], min_area: float, params: Cogenera
     return layout
 
 
-def _pair_cost(pair: _Pair, cost: FloatArray, area: FloatArray) -> float:
+def _pair_cost(pair: Pair, cost: FloatArray, area: FloatArray) -> float:
     two = [pair.keeps, pair.goes]
     return float(cost[two].sum() + _spread_cost(area[two]))
 
@@ -182,7 +196,7 @@ def _gains(
     return out
 
 
-def _joined(layout: Layout, pairs: list[_Pair]) -> tuple[Layout, npt.NDArray[np.int64]]:
+def join_pairs(layout: Layout, pairs: list[Pair]) -> tuple[Layout, npt.NDArray[np.int64]]:
     """The layout with the chains between pairs taken away, and the face before of each face."""
     editor = MeshEditor(layout.mesh)
     level = layout.face_level.copy()
