@@ -66,6 +66,41 @@ def clean_polygons(features: Features[Any]) -> Cleaned:
         If there is no feature, no polygon, a coordinate that is not finite, no area, or a
         polygon whose repair would change its area by more than 5 %.
     """
+    each = clean_each(features)
+    land = _polygonal(shapely.union_all(each.valid))
+    if land.is_empty or land.area <= 0:
+        raise BoundaryError(f"{features.name}: its polygons have no area.")
+    return Cleaned(land, each.given, each.notes)
+
+
+@dataclass(frozen=True)
+class CleanedEach:
+    """Polygons one by one.
+
+    Parameters
+    ----------
+    given, valid
+        (n,) polygons as given, and valid polygons or multipolygons; these may be empty.
+    row
+        (n,) row of the feature that each comes from.
+    notes
+        What was changed.
+    """
+
+    given: ObjectArray
+    valid: ObjectArray
+    row: npt.NDArray[np.int64]
+    notes: tuple[Note, ...]
+
+
+def clean_each(features: Features[Any]) -> CleanedEach:
+    """Return the polygons of some features, each of them made valid.
+
+    Raises
+    ------
+    BoundaryError
+        As `clean_polygons`, but for an area that is missing.
+    """
     report = _Report()
     polygons, feature = _polygons_of(features, report)
     if not report.problems:
@@ -75,10 +110,7 @@ def clean_polygons(features: Features[Any]) -> Cleaned:
     valid = _repaired(polygons, feature, report)
     if report.problems:
         raise BoundaryError(report.problems)
-    land = _polygonal(shapely.union_all(valid))
-    if land.is_empty or land.area <= 0:
-        raise BoundaryError(f"{features.name}: its polygons have no area.")
-    return Cleaned(land, polygons, tuple(report.notes))
+    return CleanedEach(polygons, valid, feature, tuple(report.notes))
 
 
 def _polygons_of(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +13,9 @@ import shapely
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.crs_choice import CrsLibrary, choose_crs, crs_label
 from urban_processing.intake.features import Features
+from urban_processing.intake.given import GivenLayers
 from urban_processing.intake.polygons import Cleaned, clean_polygons
+from urban_processing.intake.projection import Projection
 from urban_processing.site import GRID, FloatArray, Frame, Issue, Site, snap_to_grid
 
 C = TypeVar("C")
@@ -29,9 +30,6 @@ gaps between badly matched polygons, not obstacles."""
 SPECK = 1e-9
 """Parts below this share of the land are left over from repair, not land."""
 
-MAX_STEP_DEGREES = 0.25
-"""Longest edge of a geographic boundary that is projected as a straight line."""
-
 CORNER_REACH = 0.1
 """Given corners may lie this far off the land's rim, relative to √area."""
 
@@ -42,6 +40,7 @@ def build_site(
     library: CrsLibrary[C],
     asked: C | None = None,
     corners: Features[C] | None = None,
+    given: GivenLayers[C] | None = None,
     problems: Sequence[str] = (),
 ) -> Site:
     """Make land boundaries ready for the engine.
@@ -60,6 +59,8 @@ def build_site(
         Projected, metric CRS to work in; the CRS of features that have none.
     corners
         Points at the corners of a freeform land.
+    given
+        Streets, obstacles and other layers that constrain the layout.
     problems
         What is wrong already: raised with all else that is.
 
@@ -71,6 +72,8 @@ def build_site(
     found = [*problems]
     if corners is not None:
         found += _corner_problems(corners)
+    if given is not None:
+        found += given.problems()
     if features is None:
         raise BoundaryError(found)
     issues: list[Issue] = []
@@ -79,7 +82,7 @@ def build_site(
     if found or cleaned is None:
         raise BoundaryError(found)
     working = _working_crs(cleaned, own, asked, library, issues)
-    projection = _Projection(own, working, library)
+    projection = Projection(own, working, library)
     land, origin = _to_local(cleaned.land, projection)
     parts = _sorted_parts(_without_slivers(land, issues))
     frame = Frame("" if working is None else library.text(working), origin)
@@ -92,32 +95,7 @@ def build_site(
         input_sha256=_digest(cleaned.input_parts, "" if own is None else library.text(own)),
     )
     _check_size(site)
-    return site
-
-
-@dataclass(frozen=True)
-class _Projection(Generic[C]):
-    """From the source's coordinates to the working CRS; identity where either is missing."""
-
-    source: C | None
-    target: C | None
-    library: CrsLibrary[C]
-
-    @property
-    def is_identity(self) -> bool:
-        return self.source is None or self.target is None or self.source == self.target
-
-    def points(self, xy: FloatArray) -> FloatArray:
-        if self.source is None or self.target is None or self.is_identity:
-            return xy
-        return self.library.transform(xy, self.source, self.target)
-
-    def geometry(self, geometry: shapely.Geometry) -> shapely.Geometry:
-        if self.source is None or self.is_identity:
-            return geometry
-        if self.library.facts(self.source).geographic:
-            geometry = shapely.segmentize(geometry, MAX_STEP_DEGREES)
-        return shapely.transform(geometry, self.points)
+    return site if given is None else given.put_into(site, projection)
 
 
 def _source_crs(
@@ -180,7 +158,7 @@ def _working_crs(
 
 
 def _to_local(
-    land: shapely.Geometry, projection: _Projection[C]
+    land: shapely.Geometry, projection: Projection[C]
 ) -> tuple[shapely.Geometry, tuple[float, float]]:
     """Project the land, shift it to a whole-metre origin and put it on the grid."""
     mapped = projection.geometry(land)
@@ -237,7 +215,7 @@ def _sorted_parts(polygons: list[shapely.Polygon]) -> tuple[shapely.Polygon, ...
 
 
 def _input_parts(
-    polygons: npt.NDArray[np.object_], projection: _Projection[C], origin: tuple[float, float]
+    polygons: npt.NDArray[np.object_], projection: Projection[C], origin: tuple[float, float]
 ) -> tuple[shapely.Polygon, ...]:
     if projection.is_identity:
         return tuple(shapely.transform(p, lambda xy: xy - origin) for p in polygons)
@@ -248,7 +226,7 @@ def _input_parts(
 
 
 def _repair_issues(
-    cleaned: Cleaned, projection: _Projection[C], origin: tuple[float, float]
+    cleaned: Cleaned, projection: Projection[C], origin: tuple[float, float]
 ) -> list[Issue]:
     return [
         Issue(
@@ -278,34 +256,25 @@ def _digest(polygons: npt.NDArray[np.object_], crs: str) -> str:
 
 
 def _corner_problems(corners: Features[C]) -> list[str]:
-    usable = _present(corners)
-    if not usable or {g.geom_type for g in usable} - {"Point", "MultiPoint"}:
+    usable = corners.geometry[corners.present()]
+    if not len(usable) or {g.geom_type for g in usable} - {"Point", "MultiPoint"}:
         return ["Corners must be points; give a point layer or an array (k, 2)."]
     if not np.isfinite(shapely.get_coordinates(usable)).all():
         return ["Corners: a coordinate is not finite."]
     return []
 
 
-def _present(features: Features[C]) -> list[shapely.Geometry]:
-    return [g for g in features.geometry if g is not None and not g.is_empty]
-
-
 def _local_corners(
     features: Features[C] | None,
-    projection: _Projection[C],
+    projection: Projection[C],
     origin: tuple[float, float],
     parts: tuple[shapely.Polygon, ...],
 ) -> FloatArray:
     """Corners in local coordinates, checked to lie near the rim."""
     if features is None:
         return np.empty((0, 2))
-    xy = shapely.get_coordinates(_present(features))
-    own = _Projection(
-        projection.source if features.crs is None else features.crs,
-        projection.target,
-        projection.library,
-    )
-    local = snap_to_grid(own.points(xy) - origin)
+    xy = shapely.get_coordinates(features.geometry[features.present()])
+    local = snap_to_grid(projection.of(features).points(xy) - origin)
     rim = shapely.union_all([p.exterior for p in parts])
     distance = shapely.distance(shapely.points(local), rim)
     reach = CORNER_REACH * sum(p.area for p in parts) ** 0.5

@@ -18,12 +18,19 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import BoundaryError, OutputError, TopologyError
-from urban_processing.layout import Layout, Step
+from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Step
 from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
 from urban_processing.metrics.tables import Table, layout_tables
 from urban_processing.paths import geopackage_problems
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
-from urban_processing.schema import INPUT_BOUNDARY, ISSUES, PARCELS, PROVENANCE, STREETS
+from urban_processing.schema import (
+    INPUT_BOUNDARY,
+    ISSUES,
+    OBSTACLES,
+    PARCELS,
+    PROVENANCE,
+    STREETS,
+)
 from urban_processing.site import FloatArray, Frame, Issue
 
 FILE_FORMAT = 1
@@ -121,13 +128,13 @@ def read_layout(path: str | PathLike[str], *, library: LayerLibrary) -> Layout:
     x, y = state["origin"]
     file = _File(source, Frame(state["crs"], (float(x), float(y))), library)
     try:
-        parts = _read_parts(file, np.asarray(state["corners"], dtype=np.float64))
+        parts = _read_parts(file, state)
         issues = _read_issues(file)
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
         return layout.replace(
             corners_given=state["corners_given"],
             history=_read_history(file),
-            input_parts=_read_input(file),
+            input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
         )
     except TopologyError as error:
         raise TopologyError(
@@ -182,6 +189,12 @@ def _state(layout: Layout) -> str:
             "min_area": layout.min_area,
             "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
             "corners_given": layout.corners_given,
+            "entries": layout.mesh.xy[layout.vertex_entry].tolist(),
+            "fixed_streets": [
+                [s.street_class, None if math.isnan(s.width) else s.width]
+                for s in layout.fixed_streets
+            ],
+            "land_uses": list(layout.land_uses),
         }
     )
 
@@ -202,12 +215,17 @@ def _read_state(path: Path) -> dict[str, Any]:
     return state
 
 
-def _read_parts(file: _File, corners: FloatArray) -> LayoutParts:
-    polygons, parcel = file.layer(PARCELS.name, "parcel_id", "part", "level", "lineage", "locked")
+def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
+    columns = "parcel_id", "part", "level", "lineage", "locked", "land_use"
+    polygons, parcel = file.layer(PARCELS.name, *columns)
     order = np.argsort(parcel["parcel_id"], kind="stable")
-    lines, street = file.layer(STREETS.name, "level")
-    segments, level = _segments(lines, street["level"])
+    lines, street = file.layer(STREETS.name, "level", "fixed_id")
+    segments, line = _segments(lines)
     lineage = [int(text, 16) for text in parcel["lineage"]]
+    uses = list(state["land_uses"])
+    uses += sorted(set(parcel["land_use"].tolist()) - set(uses))
+    use = [uses.index(name) for name in parcel["land_use"].tolist()]
+    fixed = np.nan_to_num(np.asarray(street["fixed_id"], dtype=np.float64), nan=NOT_FIXED + 1)
     return LayoutParts(
         polygons=polygons[order],
         face_part=parcel["part"][order],
@@ -215,19 +233,30 @@ def _read_parts(file: _File, corners: FloatArray) -> LayoutParts:
         face_lineage=np.array(lineage, dtype=np.uint64)[order],
         face_locked=parcel["locked"].astype(bool)[order],
         segments=segments,
-        segment_level=level,
-        corners=corners.reshape(-1, 2),
+        segment_level=np.asarray(street["level"], dtype=np.int16)[line],
+        segment_fixed=fixed.astype(np.int64)[line] - 1,
+        corners=_places(state["corners"]),
+        entries=_places(state["entries"]),
+        face_use=np.array(use, dtype=np.int64)[order],
+        obstacles=_read_polygons(file, OBSTACLES.name),
+        fixed_streets=tuple(
+            GivenStreet(name, math.nan if width is None else width)
+            for name, width in state["fixed_streets"]
+        ),
+        land_uses=tuple(uses),
     )
 
 
-def _segments(
-    lines: npt.NDArray[np.object_], level: npt.NDArray[Any]
-) -> tuple[FloatArray, npt.NDArray[np.int16]]:
-    """Split lines at their vertices: (S, 2, 2) ends and (S,) levels."""
+def _places(xy: Any) -> FloatArray:
+    return np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+
+
+def _segments(lines: npt.NDArray[np.object_]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Split lines at their vertices: (S, 2, 2) ends, and (S,) the line of each."""
     xy, line = shapely.get_coordinates(lines, return_index=True)
     same = line[1:] == line[:-1]
     segments = np.stack([xy[:-1], xy[1:]], axis=1)[same]
-    return segments, np.asarray(level, dtype=np.int16)[line[1:][same]]
+    return segments, line[1:][same]
 
 
 def _read_issues(file: _File) -> tuple[Issue, ...]:
@@ -261,8 +290,8 @@ def _read_history(file: _File) -> tuple[Step, ...]:
     )
 
 
-def _read_input(file: _File) -> tuple[shapely.Polygon, ...]:
-    name = INPUT_BOUNDARY.name
+def _read_polygons(file: _File, name: str) -> tuple[shapely.Polygon, ...]:
+    """Polygons of a layer, none where there is no such layer."""
     if name not in file.library.layer_names(file.path):
         return ()
     geometry, _ = file.layer(name, "part")

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.errors import InfeasibleError
-from urban_processing.land import default_tolerance, first_layout, simplify_site
+from urban_processing.land import default_tolerance
 from urban_processing.layout import Layout, Step
 from urban_processing.mesh.planar import BoolArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.pipelines.findings import findings
+from urban_processing.pipelines.ground import land_area, lay_ground
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
@@ -22,6 +23,7 @@ from urban_processing.site import Site
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 from urban_processing.subdivision.cuts import AREA_ROUNDING
+from urban_processing.subdivision.first_cuts import tie_together
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
 from urban_processing.subdivision.recut import recut_irregular
@@ -158,7 +160,7 @@ def smallest_area(site: Site, params: CogenerateParams) -> float:
     """Smallest area in m² that a cut may leave."""
     if params.min_area is not None:
         return params.min_area
-    return FLOOR_SHARE * site.area / (params.parcels or 1)
+    return FLOOR_SHARE * land_area(site) / (params.parcels or 1)
 
 
 def begin(site: Site, params: CogenerateParams) -> State:
@@ -166,11 +168,16 @@ def begin(site: Site, params: CogenerateParams) -> State:
     min_area = smallest_area(site, params)
     tolerance = params.simplify
     if tolerance is None:
-        mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
+        mean = land_area(site) / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
         tolerance = default_tolerance(mean / MEAN_OVER_MIN)
-    layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
-    quota = None if params.parcels is None else shared_out(layout.mesh.face_area, params.parcels)
+    layout = lay_ground(site, params, min_area=min_area, tolerance=tolerance)
+    quota = None
+    if params.parcels is not None:
+        quota = shared_out(np.where(layout.face_locked, 0.0, layout.mesh.face_area), params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)
+    if quota is not None:
+        quota = divided(quota, parent, layout.mesh.face_area)
+    layout, parent = tie_together(layout, min_area=min_area, params=params)
     if quota is not None:
         quota = divided(quota, parent, layout.mesh.face_area)
     state = State(

@@ -53,7 +53,10 @@ class StreetState:
         self.side = math.sqrt(float(mesh.face_area.mean()))
         interior = layout.chain_kind == EdgeKind.INTERIOR
         usable = interior | layout.chain_street
-        self.interior: list[bool] = interior.tolist()
+        # streets that the user gave stay
+        self.removable: list[bool] = (interior & ~layout.chain_fixed).tolist()
+        self.fixed: list[bool] = layout.chain_fixed.tolist()
+        self.entry: list[bool] = layout.vertex_entry[graph.node_vertex].tolist()
         self.usable: list[bool] = usable.tolist()
         self.street: list[bool] = layout.chain_street.tolist()
         self.start: list[int] = graph.start.tolist()
@@ -269,4 +272,4 @@ def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
     need = np.minimum(
         required_frontage(layout.mesh.face_area) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
     )
-    return np.where(layout.face_locked, 0.0, need)
+    return need

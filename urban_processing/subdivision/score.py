@@ -122,6 +122,9 @@ def score_cuts(
     legal = (
         (smaller >= min_share[cuts.parcel] * (1.0 - AREA_ROUNDING)) & (left.n >= 3) & (right.n >= 3)
     )
+    if boundary.has_bare:
+        attached = boundary.is_attached(cuts.parcel, t_a) | boundary.is_attached(cuts.parcel, t_b)
+        legal &= attached | ~boundary.has_network[cuts.parcel]
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
