@@ -11,7 +11,7 @@ import shapely
 from urban_processing.constraints.lines import ready_streets
 from urban_processing.constraints.linework import lead_on, node_lines
 from urban_processing.mesh.planar import FloatArray, IntArray
-from urban_processing.site import GRID, Issue, LockedLand, Site, snap_to_grid
+from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +54,13 @@ def divide_land(site: Site, *, min_area: float, snap: float) -> Ground:
         empty = np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)
         return Ground(site.parts, np.arange(n), none, *empty, tuple(locked_issues))
     land = shapely.union_all(list(site.parts))
-    closed = shapely.union_all([p.polygon for p in locked.values()])
+    closed = shapely.union_all([q for p in locked.values() for q in p.polygons])
     pieces, issues = ready_streets(
         site.fixed_streets, shapely.difference(land, closed, grid_size=GRID), snap=snap
     )
     outer = [part.exterior for part in site.parts]
     inner = [ring for part in site.parts for ring in part.interiors]
-    inner += [ring for p in locked.values() for ring in shapely.get_rings(p.polygon)]
+    inner += list(shapely.get_rings([q for p in locked.values() for q in p.polygons]))
     work = node_lines(outer, inner, pieces)
     lead_on(work, min_area=min_area, snap=snap)
     polygons, part, which = _faces(work.polygons(), site.parts, locked)
@@ -76,13 +76,20 @@ def divide_land(site: Site, *, min_area: float, snap: float) -> Ground:
     )
 
 
-def _locked_on(site: Site, snap: float) -> tuple[dict[int, LockedLand], list[Issue]]:
+@dataclass(frozen=True)
+class _Locked:
+    """What is left of a locked polygon in the land."""
+
+    polygons: tuple[shapely.Polygon, ...]
+
+
+def _locked_on(site: Site, snap: float) -> tuple[dict[int, _Locked], list[Issue]]:
     """Locked land within the land, by its number; what lies outside is cut off."""
     if not site.locked:
         return {}, []
     land = shapely.union_all(list(site.parts))
     rim = land.boundary
-    out: dict[int, LockedLand] = {}
+    out: dict[int, _Locked] = {}
     lost = 0.0
     for k, given in enumerate(site.locked):
         near = shapely.make_valid(shapely.snap(given.polygon, rim, snap))
@@ -94,7 +101,7 @@ def _locked_on(site: Site, snap: float) -> tuple[dict[int, LockedLand], list[Iss
         ]
         lost += max(given.polygon.area - sum(p.area for p in kept), 0.0)
         if kept:
-            out[k] = LockedLand(shapely.MultiPolygon(kept), given.land_use)
+            out[k] = _Locked(tuple(kept))
     if lost <= snap * snap:
         return out, []
     gone = len(site.locked) - len(out)
@@ -110,7 +117,7 @@ def _locked_on(site: Site, snap: float) -> tuple[dict[int, LockedLand], list[Iss
 def _faces(
     polygons: Sequence[shapely.Polygon],
     parts: Sequence[shapely.Polygon],
-    locked: dict[int, LockedLand],
+    locked: dict[int, _Locked],
 ) -> tuple[list[shapely.Polygon], IntArray, IntArray]:
     """Faces in the land, by part and size; the part and the locked land of each."""
     turned = shapely.orient_polygons(shapely.normalize(np.array(polygons, dtype=object)))
@@ -118,11 +125,11 @@ def _faces(
     place = shapely.point_on_surface(faces)
     face, part = shapely.STRtree(list(parts)).query(place, predicate="within")
     which = np.full(len(faces), -1)
-    names = list(locked)
-    inside, number = shapely.STRtree([locked[k].polygon for k in names]).query(
+    owner = [k for k, each in locked.items() for _ in each.polygons]
+    inside, number = shapely.STRtree([q for each in locked.values() for q in each.polygons]).query(
         place, predicate="within"
     )
-    which[inside] = np.array(names, dtype=np.int64)[number]
+    which[inside] = np.array(owner, dtype=np.int64)[number]
     rows = sorted(
         zip(part.tolist(), face.tolist(), strict=True),
         key=lambda row: (row[0], -faces[row[1]].area, faces[row[1]].bounds, faces[row[1]].wkb),

@@ -20,6 +20,7 @@ from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
 from urban_processing.site import Site
+from urban_processing.streets.entries import choose_entries, join_along_rims
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 from urban_processing.subdivision.cuts import AREA_ROUNDING
@@ -251,9 +252,10 @@ def finish(state: State, progress: Progress = SILENT) -> Layout:
         )
     progress.update(RECUT_SHARE, "Cleaning up the streets")
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
+    layout = choose_entries(join_along_rims(layout, params), params)
     min_area = state.min_area
     if state.quota is not None:
-        whole = layout.mesh.face_area >= min_area
+        whole = (layout.mesh.face_area >= min_area) & ~layout.face_locked
         min_area = float(layout.mesh.face_area[whole].min(initial=np.inf))
         min_area = min_area if math.isfinite(min_area) else state.min_area
     layout = layout.replace(min_area=min_area)

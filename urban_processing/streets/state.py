@@ -124,8 +124,15 @@ class StreetState:
 
         It shares the streets, so that what is laid in the view is laid here.
         """
+        return self._with(self.layout.chain_kind == EdgeKind.HOLE)
+
+    def with_rims(self) -> StreetState:
+        """Return the same view with streets that may run along every rim."""
+        return self._with(np.ones(self.graph.n_chains, dtype=bool))
+
+    def _with(self, chains: BoolArray) -> StreetState:
         view = copy.copy(self)
-        usable = np.array(self.usable) | (self.layout.chain_kind == EdgeKind.HOLE)
+        usable = np.array(self.usable) | chains
         view.usable = usable.tolist()
         view.ahead, view.aside, view.follow = _successors(self.graph, usable)
         return view
