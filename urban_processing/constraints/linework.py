@@ -395,6 +395,6 @@ def _drop(work: Linework, graph: _Blocks, leaf: int) -> None:
                 f"{line.length:.0f} m of a given street end inside a block that is too small to be "
                 "divided there, and were left out.",
                 value=float(line.length),
-                geometry=line,
+                geometry=shapely.point_on_surface(line),
             )
         )

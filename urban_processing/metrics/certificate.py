@@ -81,7 +81,11 @@ def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None
     """
     # the geometries of `parcel_table`, without its measures, which nobody asks for here
     parcels = Table(
-        {"parcel_id": np.arange(1, layout.mesh.n_faces + 1), "part": layout.face_part},
+        {
+            "parcel_id": np.arange(1, layout.mesh.n_faces + 1),
+            "part": layout.face_part,
+            "locked": layout.face_locked,
+        },
         layout.mesh.face_polygons(layout.frame.origin),
     )
     boundary = boundary_table(layout)

@@ -7,11 +7,14 @@ import shapely
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params import CogenerateParams
 from urban_processing.site import Issue
 from urban_processing.streets.connect import join_components, join_entries
+from urban_processing.streets.groups import group_parcels
+from urban_processing.streets.reach import reach_group
 from urban_processing.streets.state import StreetState
 
 SAMPLED = 64
@@ -124,26 +127,38 @@ def _mean_way(state: StreetState, part: int) -> FloatArray:
 
 
 def join_along_rims(layout: Layout, params: CogenerateParams) -> Layout:
-    """Join what is left of separate networks by streets along rims, as the last resort.
+    """Reach, and join, what is left by streets along rims that are no street: the last resort.
 
-    Happens where a parcel that lies between them cannot be cut, and is told of.
+    Happens where parcels that would have to be cut for it are too small, and is told of.
+    Parts of one parcel stay without a street.
     """
     state = StreetState(layout, params)
     view = state.with_rims()
+    alone = np.bincount(layout.face_part)[layout.face_part] == 1
+    short = layout.frontage < reached_frontage(layout.mesh.face_area)
+    left = np.flatnonzero(short & ~alone).tolist()
+    if left:
+        distance = view.network_distance()
+        for group in group_parcels(view, left):
+            reach_group(view, group, distance, keep_ends=True)
+    join_entries(view)
     join_components(view)
     if not view.journal:
         return layout
-    bare = [i for i in view.journal if not state.usable[i]]
-    length = float(state.graph.length[bare].sum())
-    edges = state.graph.edges_of(bare)
-    ends = layout.mesh.xy[layout.mesh.origin.reshape(-1, 2)[edges]]
+    joined = state.finish(level=int(layout.edge_level.max(initial=0)))
+    bare = np.flatnonzero(
+        joined.edge_street & ~layout.edge_street & (layout.edge_kind != EdgeKind.INTERIOR)
+    )
+    if not len(bare):
+        return joined
+    length = float(layout.mesh.edge_length[bare].sum())
+    ends = layout.mesh.xy[layout.mesh.origin.reshape(-1, 2)[bare]]
     issue = Issue(
         code="street_on_rim",
-        message=f"{length:.0f} m of street run along a rim that is to be none: the network could "
-        "not be joined otherwise.",
+        message=f"{length:.0f} m of street run along a rim or shore that is no street otherwise: without them parcels "
+        "would have no street, or the network would not be one.",
         value=length,
         limit=0.0,
-        geometry=shapely.MultiLineString(list(ends)) if len(ends) else None,
+        geometry=shapely.point_on_surface(shapely.MultiLineString(list(ends))),
     )
-    joined = state.finish(level=int(layout.edge_level.max(initial=0)))
     return joined.replace(issues=(*layout.issues, issue))

@@ -134,6 +134,7 @@ class StreetState:
         view = copy.copy(self)
         usable = np.array(self.usable) | chains
         view.usable = usable.tolist()
+        view.need = _needs(self.layout, usable).tolist()
         view.ahead, view.aside, view.follow = _successors(self.graph, usable)
         return view
 
@@ -276,7 +277,6 @@ def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
         graph.face[inside], weights=graph.length[inside], minlength=layout.mesh.n_faces
     )
     # the sum of a parcel's chains may miss the sum of its edges by a rounding error
-    need = np.minimum(
+    return np.minimum(
         required_frontage(layout.mesh.face_area) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
     )
-    return need
