@@ -37,6 +37,11 @@ _SELECTION = " Only the selected features, if the box is ticked."
 _LAYERS = {
     InputKind.BOUNDARY: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.CORNER_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.FIXED_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.OBSTACLES: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
 }
 """Inputs that are layers, and their geometry."""
 

@@ -20,8 +20,8 @@ from urban_processing.mesh.corners import (
     reported_polygons,
     sharpest_vertex,
 )
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.mesh.places import edges_at, vertices_at
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
 SIMPLIFY_SHARE = 0.3

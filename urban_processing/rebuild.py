@@ -11,8 +11,8 @@ import shapely
 from urban_processing.errors import TopologyError
 from urban_processing.layout import NOT_FIXED, PARCEL_USE, GivenStreet, Layout, edge_kinds
 from urban_processing.mesh.build import mesh_from_polygons
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.mesh.places import edges_at, vertices_at
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.site import Frame, Issue
 
 

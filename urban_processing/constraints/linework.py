@@ -86,8 +86,9 @@ class Linework:
         self.z.append(z)
         self.ends[edge] = (a, vertex)
         self.ends.append((vertex, b))
-        for values in (self.street, self.firm, self.root, self.alive):
-            values.append(values[edge])  # type: ignore[attr-defined]
+        self.street.append(self.street[edge])
+        for values in (self.firm, self.root, self.alive):
+            values.append(values[edge])
         return vertex
 
 
@@ -359,8 +360,9 @@ def _drawn(work: Linework, ray: _Ray, min_area: float) -> bool:
         return True
     n_points, n_edges, work.ends[ray.edge] = before
     del work.z[n_points:]
-    for values in (work.ends, work.street, work.firm, work.root, work.alive):
-        del values[n_edges:]  # type: ignore[attr-defined]
+    del work.ends[n_edges:], work.street[n_edges:]
+    for values in (work.firm, work.root, work.alive):
+        del values[n_edges:]
     return False
 
 

@@ -114,7 +114,7 @@ def _wrong(features: Features[Any] | None, name: str, kind: str) -> list[str]:
     usable = features.geometry[features.present()]
     if not len(usable):
         return [f"{name}: {features.name} has no {kind}s: leave it out, or give another layer."]
-    parts = _flat(usable)
+    parts = _flat(list(usable))
     found = {g.geom_type for g in parts}
     wanted = {"line": {"LineString", "LinearRing"}, "point": {"Point"}, "polygon": {"Polygon"}}
     if found - wanted[kind]:

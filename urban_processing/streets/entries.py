@@ -122,8 +122,8 @@ def _mean_way(state: StreetState, part: int) -> FloatArray:
     at = graph.start[mine[first]]
     some = at[np.unique(np.linspace(0, len(at) - 1, SAMPLED).astype(np.int64))]
     way = dijkstra(_links(state, street), indices=some)[:, :-1].mean(axis=0)
-    beyond = dijkstra(_links(state, ~street & np.array(state.usable), way), indices=graph.n_nodes)
-    return np.asarray(beyond[:-1])
+    beyond = dijkstra(_links(state, ~street & np.array(state.usable), way), indices=[graph.n_nodes])
+    return np.asarray(beyond[0, :-1])
 
 
 def join_along_rims(layout: Layout, params: CogenerateParams) -> Layout:
@@ -155,8 +155,8 @@ def join_along_rims(layout: Layout, params: CogenerateParams) -> Layout:
     ends = layout.mesh.xy[layout.mesh.origin.reshape(-1, 2)[bare]]
     issue = Issue(
         code="street_on_rim",
-        message=f"{length:.0f} m of street run along a rim or shore that is no street otherwise: without them parcels "
-        "would have no street, or the network would not be one.",
+        message=f"{length:.0f} m of street run along a rim or shore that is no street "
+        "otherwise: without them parcels would have no street, or the network would not be one.",
         value=length,
         limit=0.0,
         geometry=shapely.point_on_surface(shapely.MultiLineString(list(ends))),

@@ -67,10 +67,10 @@ class StreetNetwork:
     A network edge is a chain of street edges between nodes. Nodes are the vertices where
     other than two street edges meet, where the rim meets an interior street, where a street
     that the user gave begins or ends, at entries, and where an interior street bends by an
-    included angle of at most `STRAIGHT_DEG`. Rim streets are
-    those on the outer ring of the land; they bend as the land does and are divided only where
-    an interior street meets them. All numbering and all directions follow from coordinates
-    alone, so that they do not depend on the order of mesh edges.
+    included angle of at most `STRAIGHT_DEG`. Rim streets are those on the outer ring of the
+    land; they bend as the land does and are divided only where an interior street meets them.
+    All numbering and all directions follow from coordinates alone, so that they do not depend
+    on the order of mesh edges.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ class StreetNetwork:
     edge_part, edge_level, edge_length
         (K,) part of the land, lowest level of its mesh edges, length in metres.
     edge_class
-        (K,) `StreetClass`, or the class that the user gave a street: a *cul-de-sac* leads to nothing but a street end; a *collector* is
+        (K,) `StreetClass`, or the class that the user gave a street: a *cul-de-sac* leads to
+        nothing but a street end; a *collector* is
         another interior edge of the first half (rounded up) of the levels that have interior
         streets; the other interior edges are *local*. A given street without a class is *fixed*.
     edge_width

@@ -277,6 +277,5 @@ def _needs(layout: Layout, usable: BoolArray) -> FloatArray:
         graph.face[inside], weights=graph.length[inside], minlength=layout.mesh.n_faces
     )
     # the sum of a parcel's chains may miss the sum of its edges by a rounding error
-    return np.minimum(
-        required_frontage(layout.mesh.face_area) * (1.0 + 1e-9), possible * (1.0 - 1e-9)
-    )
+    need = required_frontage(layout.mesh.face_area) * (1.0 + 1e-9)
+    return np.asarray(np.minimum(need, possible * (1.0 - 1e-9)))
