@@ -140,8 +140,9 @@ class Sources:
     ) -> list[tuple[shapely.Geometry | None, list[Any]]]:
         """Read geometries and some attributes of the features.
 
-        What is invalid is treated as the user's settings say. They are followed here: where QGIS itself stops the reading of a layer, its C++
-        exception passes through the Python interpreter and breaks it.
+        What is invalid is treated as the user's settings say. They are followed here: where QGIS
+        itself stops the reading of a layer, its C++ exception passes through the Python
+        interpreter and breaks it.
         """
         request = QgsFeatureRequest().setSubsetOfAttributes(list(columns), source.fields())
         unchecked = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks

@@ -82,10 +82,15 @@ class _Merger:
         self.editor = MeshEditor(layout.mesh)
         self.min_area = min_area
         # these stay where they are: corners, entries, and all of the streets that were given
-        firm = layout.vertex_corner | layout.vertex_entry
-        firm[layout.mesh.origin[np.repeat(layout.edge_fixed != NOT_FIXED, 2)]] = True
-        self.corner: list[bool] = firm.tolist()
-        self.node: list[bool] = (layout.vertex_corner | layout.vertex_entry).tolist()
+        fixed = layout.edge_fixed != NOT_FIXED
+        at_fixed = np.bincount(
+            layout.mesh.origin, weights=np.repeat(fixed, 2), minlength=layout.mesh.n_vertices
+        )
+        node = layout.vertex_corner | layout.vertex_entry
+        self.corner: list[bool] = (node | (at_fixed > 0)).tolist()
+        # what follows a vertex that moves ends where a given street begins
+        node |= (at_fixed > 0) & (at_fixed < layout.mesh.valence)
+        self.node: list[bool] = node.tolist()
         self.on_rim: list[bool] = layout.mesh.vertex_is_boundary.tolist()
         self.locked: list[bool] = layout.face_locked.tolist()
         loops = layout.mesh.loops
