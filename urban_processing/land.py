@@ -11,7 +11,7 @@ import shapely
 
 from urban_processing.constraints.ground import Ground
 from urban_processing.constraints.rim import edges_along
-from urban_processing.errors import BoundaryError
+from urban_processing.errors import BoundaryError, TopologyError
 from urban_processing.layout import EdgeKind, GivenStreet, Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
 from urban_processing.mesh.corners import (
@@ -367,14 +367,18 @@ def first_layout(
 def _with_ground(layout: Layout, ground: Ground, site: Site) -> Layout:
     """The layout with its given streets and locked parcels."""
     edge = edges_at(layout.mesh, ground.segments)
-    here = edge >= 0
+    if (edge < 0).any():
+        raise TopologyError(
+            f"{int((edge < 0).sum())} pieces of given streets bound no parcel; this is a mistake of "
+            "the software: leave out the streets that end inside the land, and report it."
+        )
     fixed, street, level = (
         layout.edge_fixed.copy(),
         layout.edge_street.copy(),
         layout.edge_level.copy(),
     )
-    fixed[edge[here]] = ground.segment_street[here]
-    street[edge[here]], level[edge[here]] = True, 0
+    fixed[edge] = ground.segment_street
+    street[edge], level[edge] = True, 0
     names = [*layout.land_uses, *dict.fromkeys(each.land_use for each in site.locked)]
     uses = tuple(dict.fromkeys(names))
     use = np.array([0, *(uses.index(each.land_use) for each in site.locked)])[ground.locked + 1]

@@ -28,6 +28,9 @@ BEND_COST, SKEW_COST, TREE_COST = 1.5, 0.5, 0.5
 """Cost of a right-angled bend, of meeting a line at a slant, and of meeting one that does not
 bound a face itself; a line across the land costs 1."""
 
+LEAST_ANGLE = math.radians(5.0)
+"""A line leaves a vertex at no smaller angle to what is there already."""
+
 AROUND = 8
 """Number of points of a ring of streets from which it is tied to what is around it."""
 
@@ -279,8 +282,11 @@ def _rays(work: Linework, graph: _Blocks, leaf: int, scale: float, snap: float) 
     rays = []
     for v, ahead in _starts(work, graph, members):
         away = (ends[:, 0] != v) & (ends[:, 1] != v)
+        known = np.array([z[w] - z[v] for w, _ in graph.out[v]])
         for degrees in ANGLES:
             direction = ahead * np.exp(1j * math.radians(degrees))
+            if np.abs(np.angle(known * np.conj(direction))).min() < LEAST_ANGLE:
+                continue
             hit = _hit(z[v], direction, a, b, away)
             if hit is None or own[hit[0]]:
                 continue
@@ -352,6 +358,11 @@ def _drawn(work: Linework, ray: _Ray, min_area: float) -> bool:
         return False
     before = len(work.z), len(work.ends), ends
     vertex = known[place] if place in known else work.split(ray.edge, place)
+    if any(
+        here and {ray.start, vertex} == set(pair)
+        for here, pair in zip(work.alive, work.ends, strict=True)
+    ):
+        return False
     work.add(ray.start, vertex)
     middle = 0.5 * (work.z[ray.start] + place)
     faces = np.array(work.polygons(), dtype=object)
