@@ -55,13 +55,13 @@ def divide_land(site: Site, *, min_area: float, snap: float) -> Ground:
         return Ground(site.parts, np.arange(n), none, *empty, tuple(locked_issues))
     land = shapely.union_all(list(site.parts))
     closed = shapely.union_all([q for p in locked.values() for q in p.polygons])
-    pieces, issues = ready_streets(
-        site.fixed_streets, shapely.difference(land, closed, grid_size=GRID), snap=snap
-    )
+    ground = shapely.difference(land, closed, grid_size=GRID)
+    pieces, issues = ready_streets(site.fixed_streets, ground, snap=snap)
     outer = [part.exterior for part in site.parts]
     inner = [ring for part in site.parts for ring in part.interiors]
     inner += list(shapely.get_rings([q for p in locked.values() for q in p.polygons]))
     work = node_lines(outer, inner, pieces)
+    work.clip(ground)
     lead_on(work, min_area=min_area, snap=snap)
     polygons, part, which = _faces(work.polygons(), site.parts, locked)
     segments, street = work.segments()

@@ -45,8 +45,9 @@ def ready_streets(
     for number, street in enumerate(streets):
         for simple in _simple_lines(street.line):
             for line, along in _split_along(simple, rim, snap):
-                if along:
-                    pieces.append(Piece(_run_of(rim, line), number))
+                run = _run_of(rim, line, snap) if along else None
+                if run is not None:
+                    pieces.append(Piece(run, number))
                     continue
                 inside = [g for g in _lines(shapely.intersection(line, ground)) if g.length > snap]
                 count.outside += line.length - sum(g.length for g in inside)
@@ -135,8 +136,13 @@ def _split_along(
         yield substring(line, at, length), False
 
 
-def _run_of(rim: shapely.Geometry, line: shapely.LineString) -> shapely.LineString:
-    """The run of a ring beside a line: of its two ways from end to end the nearer one."""
+def _run_of(
+    rim: shapely.Geometry, line: shapely.LineString, snap: float
+) -> shapely.LineString | None:
+    """The run of a ring beside a line: of its two ways from end to end the nearer one.
+
+    None where the line turns back at the rim, so that neither way is about as long as it.
+    """
     middle = line.interpolate(0.5, normalized=True)
     rings = [shapely.LineString(g) for g in _closed(rim)]
     ring = min(rings, key=lambda g: (round(g.distance(middle), 6), g.wkb))
@@ -150,8 +156,14 @@ def _run_of(rim: shapely.Geometry, line: shapely.LineString) -> shapely.LineStri
         *shapely.get_coordinates(substring(ring, 0.0, low))[1:],
     ]
     outer = shapely.LineString(xy)
-    runs = [run for run in (inner, outer) if run.length > 0]
-    return min(runs, key=lambda run: run.distance(middle))
+    alike = [
+        run
+        for run in (inner, outer)
+        if run.length > 0
+        and abs(run.length - line.length) <= 0.5 * line.length
+        and run.distance(middle) <= 2 * snap
+    ]
+    return min(alike, key=lambda run: run.distance(middle), default=None)
 
 
 def _closed(rim: shapely.Geometry) -> list[shapely.Geometry]:

@@ -74,6 +74,13 @@ class Linework:
         """All faces, holes of the land among them."""
         return list(shapely.get_parts(shapely.polygonize(shapely.linestrings(self.segments()[0]))))
 
+    def clip(self, ground: shapely.Geometry) -> None:
+        """Remove streets beside the ground: ends that were moved may cut a corner of the rim."""
+        z = np.array(self.z)[np.array(self.ends)].mean(axis=1)
+        beside = ~shapely.dwithin(ground, shapely.points(z.real, z.imag), ON)
+        for e in np.flatnonzero(beside).tolist():
+            self.alive[e] = self.alive[e] and self.firm[e]
+
     def add(self, a: int, b: int) -> None:
         """Add an edge that is no street."""
         self.ends.append((a, b))
