@@ -119,6 +119,15 @@ def test_inputs_are_layers_of_the_right_kind(algorithm: Any) -> None:
     assert boundary.dataTypes() == [QgsProcessing.SourceType.TypeVectorPolygon]
     corners = algorithm.parameterDefinition("CORNERS")
     assert corners.dataTypes() == [QgsProcessing.SourceType.TypeVectorPoint]
+    kinds = QgsProcessing.SourceType
+    for name, kind in {
+        "STREETS": kinds.TypeVectorLine,
+        "OBSTACLES": kinds.TypeVectorPolygon,
+        "LOCKED": kinds.TypeVectorPolygon,
+        "RIM_LINES": kinds.TypeVectorLine,
+        "ENTRIES": kinds.TypeVectorPoint,
+    }.items():
+        assert algorithm.parameterDefinition(name).dataTypes() == [kind]
 
 
 def test_results_are_sinks_and_files_and_all_optional(algorithm: Any) -> None:
