@@ -369,8 +369,8 @@ def _with_ground(layout: Layout, ground: Ground, site: Site) -> Layout:
     edge = edges_at(layout.mesh, ground.segments)
     if (edge < 0).any():
         raise TopologyError(
-            f"{int((edge < 0).sum())} pieces of given streets bound no parcel; this is a mistake of "
-            "the software: leave out the streets that end inside the land, and report it."
+            f"{int((edge < 0).sum())} pieces of given streets bound no parcel; this is a mistake "
+            "of the software: leave out the streets that end inside the land, and report it."
         )
     fixed, street, level = (
         layout.edge_fixed.copy(),

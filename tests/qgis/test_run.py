@@ -209,7 +209,7 @@ def test_contradictions_of_layers_and_values_are_said_in_the_dialogs_words(
 ) -> None:
     land = layer([square(300)])
     edge = layer(["LINESTRING (690000 5700000, 690300 5700000)"], kind="LineString")
-    with pytest.raises(Exception, match="“Streets on the rim” none speaks.*“Rim lines”"):
+    with pytest.raises(Exception, match=r"“Streets on the rim” none speaks.*“Rim lines”"):
         run(land, PARCELS=9, RIM=1, RIM_LINES=edge, OUTPUT_PARCELS=TEMPORARY)
 
 

@@ -106,7 +106,7 @@ def test_all_that_is_wrong_is_said_together() -> None:
 
 def test_bow_ties_and_overlaps_of_given_polygons() -> None:
     bow = shapely.Polygon([(X, Y), (X + 50, Y + 50), (X + 50, Y), (X, Y + 50)])
-    with pytest.raises(BoundaryError, match="Obstacles: .*bow-tie"):
+    with pytest.raises(BoundaryError, match=r"Obstacles: .*bow-tie"):
         read_boundary(LAND, crs=UTM, obstacles=bow)
     twice = frame([shapely.box(X, Y, X + 50, Y + 50), shapely.box(X + 25, Y, X + 75, Y + 50)])
     site = read_boundary(LAND, crs=UTM, locked=twice, obstacles=twice)

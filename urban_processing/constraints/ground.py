@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from urban_processing.constraints.leads import lead_on
 from urban_processing.constraints.lines import ready_streets
-from urban_processing.constraints.linework import lead_on, node_lines
+from urban_processing.constraints.linework import node_lines
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
@@ -62,8 +63,9 @@ def divide_land(site: Site, *, min_area: float, snap: float) -> Ground:
     inner += list(shapely.get_rings([q for p in locked.values() for q in p.polygons]))
     work = node_lines(outer, inner, pieces)
     work.clip(ground)
-    lead_on(work, min_area=min_area, snap=snap)
-    polygons, part, which = _faces(work.polygons(), site.parts, locked)
+    holes = sum(shapely.Polygon(ring).area for ring in inner)
+    lead_on(work, min_area=min_area, snap=snap, holes=holes)
+    polygons, part, which = _faces(list(work.polygons()), site.parts, locked)
     segments, street = work.segments()
     on = street >= 0
     return Ground(

@@ -1,9 +1,4 @@
-"""Rims and given streets as one planar graph, led on until its faces have simple outlines.
-
-A street that ends inside a face, or leads to a hole, has that face on both sides. Its end is
-prolonged by a line to the boundary ahead, which is no street: only then does the graph divide
-the land into parcels that have the street on their boundaries.
-"""
+"""Rims and given streets as one planar graph that grows and shrinks."""
 
 from __future__ import annotations
 
@@ -12,30 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from urban_processing.constraints.lines import Piece
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import GRID, Issue
 
 ON = 1e-5
 """Noded segments lie within this many metres of the line that they come from."""
-
-ANGLES = (0, 15, -15, 30, -30, 45, -45, 60, -60, 75, -75, 90, -90, 105, -105, 120, -120)
-"""Directions in degrees, from straight on, in which an end may be prolonged."""
-
-BEND_COST, SKEW_COST, TREE_COST = 1.5, 0.5, 0.5
-"""Cost of a right-angled bend, of meeting a line at a slant, and of meeting one that does not
-bound a face itself; a line across the land costs 1."""
-
-LEAST_ANGLE = math.radians(5.0)
-"""A line leaves a vertex at no smaller angle to what is there already."""
-
-AROUND = 8
-"""Number of points of a ring of streets from which it is tied to what is around it."""
-
-AREA_ROUNDING = 1e-9
-"""Share of the smallest area that may be lost to rounding."""
 
 
 @dataclass
@@ -54,6 +34,12 @@ class Linework:
         Edges of rims and of locked land, which cannot be removed.
     root
         Edges of outer rings.
+    alive
+        Edges that are there.
+    out
+        Neighbours of each vertex, with the edges that lead to them.
+    issues
+        What was left out.
     """
 
     z: list[complex]
@@ -62,44 +48,117 @@ class Linework:
     firm: list[bool]
     root: list[bool]
     alive: list[bool] = field(default_factory=list)
+    out: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
     issues: list[Issue] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Begin with all edges."""
+        self.alive = [True] * len(self.ends)
+        for e in range(len(self.ends)):
+            self._link(e)
+
+    def _link(self, edge: int) -> None:
+        a, b = self.ends[edge]
+        self.out.setdefault(a, []).append((b, edge))
+        self.out.setdefault(b, []).append((a, edge))
+
+    def _unlink(self, edge: int) -> None:
+        a, b = self.ends[edge]
+        self.out[a].remove((b, edge))
+        self.out[b].remove((a, edge))
+
+    def edges(self) -> list[int]:
+        """Edges that are there."""
+        return [e for e, here in enumerate(self.alive) if here]
 
     def segments(self) -> tuple[FloatArray, IntArray]:
         """(S, 2, 2) ends of all edges, and (S,) the given street of each."""
-        on = [e for e, here in enumerate(self.alive) if here]
+        on = self.edges()
         z = np.array(self.z)[np.array([self.ends[e] for e in on])]
         return np.stack([z.real, z.imag], axis=-1), np.array([self.street[e] for e in on])
 
-    def polygons(self) -> list[shapely.Polygon]:
+    def polygons(self) -> npt.NDArray[np.object_]:
         """All faces, holes of the land among them."""
-        return list(shapely.get_parts(shapely.polygonize(shapely.linestrings(self.segments()[0]))))
+        lines = shapely.linestrings(self.segments()[0])
+        return np.asarray(shapely.get_parts(shapely.polygonize(lines)), dtype=object)
 
     def clip(self, ground: shapely.Geometry) -> None:
         """Remove streets beside the ground: ends that were moved may cut a corner of the rim."""
         z = np.array(self.z)[np.array(self.ends)].mean(axis=1)
         beside = ~shapely.dwithin(ground, shapely.points(z.real, z.imag), ON)
         for e in np.flatnonzero(beside).tolist():
-            self.alive[e] = self.alive[e] and self.firm[e]
+            if not self.firm[e]:
+                self.remove(e)
 
-    def add(self, a: int, b: int) -> None:
-        """Add an edge that is no street."""
+    def add(self, a: int, b: int) -> int:
+        """Add an edge that is no street; return it."""
+        edge = len(self.ends)
         self.ends.append((a, b))
         self.street.append(-1)
         self.firm.append(False)
         self.root.append(False)
         self.alive.append(True)
+        self._link(edge)
+        return edge
 
     def split(self, edge: int, z: complex) -> int:
         """Put a vertex on an edge; return it."""
         a, b = self.ends[edge]
-        vertex = len(self.z)
+        vertex, new = len(self.z), len(self.ends)
+        self._unlink(edge)
         self.z.append(z)
         self.ends[edge] = (a, vertex)
         self.ends.append((vertex, b))
         self.street.append(self.street[edge])
         for values in (self.firm, self.root, self.alive):
             values.append(values[edge])
+        self._link(edge)
+        self._link(new)
         return vertex
+
+    def join(self, edge: int, vertex: int) -> None:
+        """Take back the last split of an edge, at a vertex that nothing else meets."""
+        new = next(e for _, e in self.out[vertex] if e != edge)
+        a, b = self.ends[edge][0], self.ends[new][1]
+        self.remove(new)
+        self._unlink(edge)
+        self.ends[edge] = (a, b)
+        self._link(edge)
+
+    def remove(self, edge: int) -> None:
+        """Take an edge away."""
+        self.alive[edge] = False
+        self._unlink(edge)
+
+    def loop(self, edge: int, start: int) -> tuple[float, set[tuple[int, int]]]:
+        """Area of the loop to the left of an edge that leaves a vertex, and its steps.
+
+        Negative where the loop runs around something from outside; holes count as area.
+        """
+        twice = 0.0
+        steps: set[tuple[int, int]] = set()
+        base = self.z[start]
+        u, e = start, edge
+        while (u, e) not in steps:
+            steps.add((u, e))
+            a, b = self.ends[e]
+            v = b if u == a else a
+            twice += ((self.z[u] - base).conjugate() * (self.z[v] - base)).imag
+            u, e = v, self._next(v, u, e)
+        return 0.5 * twice, steps
+
+    def _next(self, v: int, came: int, edge: int) -> int:
+        """The edge that comes next clockwise at a vertex after the one it was reached by."""
+        back = (self.z[came] - self.z[v]).conjugate()
+        best, least = edge, math.inf
+        for w, e in self.out[v]:
+            if e == edge:
+                continue
+            turn = (self.z[w] - self.z[v]) * back
+            angle = -math.atan2(turn.imag, turn.real) % math.tau
+            if angle < least:
+                best, least = e, angle
+        return best
 
 
 def node_lines(
@@ -137,7 +196,6 @@ def node_lines(
         street=street.tolist(),
         firm=(is_root | is_inner).tolist(),
         root=is_root.tolist(),
-        alive=[True] * len(pairs),
     )
 
 
@@ -155,266 +213,3 @@ def _on_lines(lines: Sequence[shapely.Geometry], ends: np.ndarray) -> tuple[IntA
     both = sorted(set.intersection(*found))
     pairs = np.array(both, dtype=np.int64).reshape(-1, 2)
     return pairs[:, 0], pairs[:, 1]
-
-
-def lead_on(work: Linework, *, min_area: float, snap: float) -> None:
-    """Prolong street ends, and tie rings of streets, until every street parts two faces.
-
-    Streets whose face is too small to be divided are dropped and listed in the issues.
-    """
-    while True:
-        graph = _Blocks(work)
-        leaf = graph.first_leaf()
-        if leaf is None:
-            return
-        scale = math.sqrt(_extent(work))
-        for ray in _rays(work, graph, leaf, scale, snap):
-            if _drawn(work, ray, min_area):
-                break
-        else:
-            _drop(work, graph, leaf)
-
-
-@dataclass(frozen=True)
-class _Ray:
-    """A line from a vertex to a point of an edge, or to one of its ends."""
-
-    cost: float
-    start: int
-    edge: int
-    place: complex
-
-
-class _Blocks:
-    """Blocks: sets of vertices that stay connected without any one edge."""
-
-    def __init__(self, work: Linework) -> None:
-        self.work = work
-        self.out: dict[int, list[tuple[int, int]]] = {}
-        for e, here in enumerate(work.alive):
-            if here:
-                a, b = work.ends[e]
-                self.out.setdefault(a, []).append((b, e))
-                self.out.setdefault(b, []).append((a, e))
-        self.bridges = self._find_bridges()
-        self.block = self._flood(self.bridges)
-        self.component = self._flood(set())
-        self.bridges_of: dict[int, list[int]] = {}
-        for e in sorted(self.bridges):
-            for v in work.ends[e]:
-                self.bridges_of.setdefault(self.block[v], []).append(e)
-
-    def _find_bridges(self) -> set[int]:
-        """Edges that are the only link between what lies beyond them (Tarjan 1974)."""
-        order: dict[int, int] = {}
-        low: dict[int, int] = {}
-        bridges = set()
-        for root in self.out:
-            if root in order:
-                continue
-            order[root] = low[root] = len(order)
-            stack = [(root, -1, iter(self.out[root]))]
-            while stack:
-                v, came, rest = stack[-1]
-                for w, e in rest:
-                    if e == came:
-                        continue
-                    if w in order:
-                        low[v] = min(low[v], order[w])
-                    else:
-                        order[w] = low[w] = len(order)
-                        stack.append((w, e, iter(self.out[w])))
-                        break
-                else:
-                    stack.pop()
-                    if stack:
-                        parent = stack[-1][0]
-                        low[parent] = min(low[parent], low[v])
-                        if low[v] > order[parent]:
-                            bridges.add(came)
-        return bridges
-
-    def _flood(self, without: set[int]) -> dict[int, int]:
-        label: dict[int, int] = {}
-        for first in self.out:
-            if first in label:
-                continue
-            label[first] = first
-            front = [first]
-            for v in front:
-                for w, e in self.out[v]:
-                    if e not in without and w not in label:
-                        label[w] = first
-                        front.append(w)
-        return label
-
-    def first_leaf(self) -> int | None:
-        """A block of streets that hangs on one bridge, or stands free; None if there is none."""
-        work = self.work
-        rooted, with_street = set(), set()
-        for e, here in enumerate(work.alive):
-            if here:
-                v = work.ends[e][0]
-                if work.root[e]:
-                    rooted.add(self.block[v])
-                if not work.firm[e]:
-                    with_street.add(self.component[v])
-        for v in sorted(self.out, key=lambda v: (work.z[v].real, work.z[v].imag)):
-            b = self.block[v]
-            n = len(self.bridges_of.get(b, []))
-            if b not in rooted and n <= 1 and self.component[v] in with_street:
-                return b
-        return None
-
-    def members(self, block: int) -> list[int]:
-        """Vertices of a block, by their coordinates."""
-        z = self.work.z
-        inside = [v for v, b in self.block.items() if b == block]
-        return sorted(inside, key=lambda v: (z[v].real, z[v].imag))
-
-
-def _extent(work: Linework) -> float:
-    z = np.array(work.z)
-    return float(max(np.ptp(z.real) * np.ptp(z.imag), GRID))
-
-
-def _rays(work: Linework, graph: _Blocks, leaf: int, scale: float, snap: float) -> list[_Ray]:
-    """Lines from a block to what is around it, the cheapest first."""
-    members = graph.members(leaf)
-    on = [e for e, here in enumerate(work.alive) if here]
-    ends = np.array([work.ends[e] for e in on])
-    z = np.array(work.z)
-    a, b = z[ends[:, 0]], z[ends[:, 1]]
-    own = np.array([graph.block[v] == leaf == graph.block[w] for v, w in ends.tolist()])
-    rays = []
-    for v, ahead in _starts(work, graph, members):
-        away = (ends[:, 0] != v) & (ends[:, 1] != v)
-        known = np.array([z[w] - z[v] for w, _ in graph.out[v]])
-        for degrees in ANGLES:
-            direction = ahead * np.exp(1j * math.radians(degrees))
-            if np.abs(np.angle(known * np.conj(direction))).min() < LEAST_ANGLE:
-                continue
-            hit = _hit(z[v], direction, a, b, away)
-            if hit is None or own[hit[0]]:
-                continue
-            k, length = hit
-            place = z[v] + length * direction
-            edge = b[k] - a[k]
-            slant = 1.0 - abs((np.conj(direction) * edge).imag) / abs(edge)
-            cost = length / scale + BEND_COST * abs(degrees) / 90.0 + SKEW_COST * slant
-            cost += TREE_COST * (on[k] in graph.bridges)
-            near = [w for w in (a[k], b[k]) if abs(w - place) <= snap]
-            if near and _is_clear(z[v], near[0], a, b, away):
-                place = near[0]
-            rays.append(_Ray(round(cost, 9), v, on[k], complex(place)))
-    return sorted(rays, key=lambda r: (r.cost, r.start, r.edge, r.place.real, r.place.imag))
-
-
-def _starts(work: Linework, graph: _Blocks, members: list[int]) -> list[tuple[int, complex]]:
-    """Vertices to draw lines from, with the direction that leads on from each."""
-    z = work.z
-    if len(members) == 1:
-        v = members[0]
-        bridge = graph.out[v][0]
-        d = z[v] - z[bridge[0]]
-        return [(v, d / abs(d))]
-    centre = sum(z[v] for v in members) / len(members)
-    some = members if len(members) <= AROUND else _spread(members, z, centre)
-    return [(v, (z[v] - centre) / abs(z[v] - centre)) for v in some if z[v] != centre]
-
-
-def _spread(members: list[int], z: list[complex], centre: complex) -> list[int]:
-    """The outermost vertices in directions all around."""
-    turns = np.exp(2j * np.pi * np.arange(AROUND) / AROUND)
-    return sorted(
-        {max(members, key=lambda v: (((z[v] - centre) * np.conj(t)).real, v)) for t in turns}
-    )
-
-
-def _hit(
-    start: complex, direction: complex, a: np.ndarray, b: np.ndarray, away: BoolArray
-) -> tuple[int, float] | None:
-    """The first segment that a ray meets, and how far it goes."""
-    e = b - a
-    across = (np.conj(direction) * e).imag
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (np.conj(a - start) * e).imag / across
-        s = (np.conj(a - start) * direction).imag / across
-    ok = away & (across != 0) & (t > GRID) & (s >= -1e-12) & (s <= 1 + 1e-12)
-    if not ok.any():
-        return None
-    k = int(np.argmin(np.where(ok, t, np.inf)))
-    return k, float(t[k])
-
-
-def _is_clear(start: complex, stop: complex, a: np.ndarray, b: np.ndarray, away: BoolArray) -> bool:
-    """Whether a line meets nothing before it stops at a vertex."""
-    length = abs(stop - start)
-    if length <= GRID:
-        return False
-    hit = _hit(start, (stop - start) / length, a, b, away & (a != stop) & (b != stop))
-    return hit is None or hit[1] > length
-
-
-def _drawn(work: Linework, ray: _Ray, min_area: float) -> bool:
-    """Draw a line if the faces beside it are large enough; else change nothing."""
-    ends = work.ends[ray.edge]
-    known = {work.z[v]: v for v in ends}
-    place = complex(round(ray.place.real / GRID) * GRID, round(ray.place.imag / GRID) * GRID)
-    if place == work.z[ray.start]:
-        return False
-    before = len(work.z), len(work.ends), ends
-    vertex = known[place] if place in known else work.split(ray.edge, place)
-    if any(
-        here and {ray.start, vertex} == set(pair)
-        for here, pair in zip(work.alive, work.ends, strict=True)
-    ):
-        return False
-    work.add(ray.start, vertex)
-    middle = 0.5 * (work.z[ray.start] + place)
-    faces = np.array(work.polygons(), dtype=object)
-    beside = faces[shapely.dwithin(faces, shapely.Point(middle.real, middle.imag), ON)]
-    if shapely.area(beside).min(initial=np.inf) >= min_area * (1 - AREA_ROUNDING):
-        return True
-    n_points, n_edges, work.ends[ray.edge] = before
-    del work.z[n_points:]
-    del work.ends[n_edges:], work.street[n_edges:]
-    for values in (work.firm, work.root, work.alive):
-        del values[n_edges:]
-    return False
-
-
-def _drop(work: Linework, graph: _Blocks, leaf: int) -> None:
-    """Remove a block of streets that cannot be led on, and the way to it."""
-    members = set(graph.members(leaf))
-    gone = [
-        e
-        for e, here in enumerate(work.alive)
-        if here and not work.firm[e] and set(work.ends[e]) <= members
-    ]
-    chain = list(graph.bridges_of.get(leaf, []))
-    v = next((v for e in chain for v in work.ends[e] if v not in members), None)
-    # the way goes back to where something else meets it
-    while v is not None and len(graph.out[v]) == 2:
-        step = next((w, e) for w, e in graph.out[v] if e != chain[-1])
-        if step[1] not in graph.bridges:
-            break
-        chain.append(step[1])
-        v = step[0]
-    lines = []
-    for e in [*gone, *chain]:
-        work.alive[e] = False
-        if work.street[e] >= 0:
-            a, b = (work.z[v] for v in work.ends[e])
-            lines.append(shapely.LineString([(a.real, a.imag), (b.real, b.imag)]))
-    if lines:
-        line = shapely.line_merge(shapely.union_all(lines))
-        work.issues.append(
-            Issue(
-                "fixed_street_dropped",
-                f"{line.length:.0f} m of a given street end inside a block that is too small to be "
-                "divided there, and were left out.",
-                value=float(line.length),
-                geometry=shapely.point_on_surface(line),
-            )
-        )
