@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.metrics.overlap import covered_share, find_overlaps, segments_of
+from urban_processing.metrics.overlap import Segments, covered_share, find_overlaps, segments_of
 from urban_processing.metrics.tables import (
     Table,
     boundary_table,
@@ -343,17 +343,25 @@ def _large_enough(
 
 
 def _enclosed(polygons: npt.NDArray[np.object_], chosen: BoolArray, bounds: _Bounds) -> BoolArray:
-    """Which chosen parcels have all of their outline on bounds."""
+    """Which chosen parcels have all of their outline on bounds, some of it on what was given."""
     out = np.zeros(len(polygons), dtype=bool)
     rows = np.flatnonzero(chosen)
     if not len(rows):
         return out
-    around = np.concatenate([bounds.streets, bounds.land, polygons[bounds.locked]])
     outline = segments_of(polygons[rows])
-    share = covered_share(find_overlaps(outline, segments_of(around), SNAP_M), len(outline.line))
-    free = np.bincount(outline.line, weights=(1.0 - share) * outline.length, minlength=len(rows))
-    out[rows] = free <= SNAP_M * (1 + np.bincount(outline.line, minlength=len(rows)))
+    given = np.concatenate([bounds.streets, polygons[bounds.locked]])
+    on_given = _length_on(outline, given, len(rows))
+    on_any = _length_on(outline, np.concatenate([given, bounds.land]), len(rows))
+    whole = np.bincount(outline.line, weights=outline.length, minlength=len(rows))
+    rounding = SNAP_M * (1 + np.bincount(outline.line, minlength=len(rows)))
+    out[rows] = (on_any >= whole - rounding) & (on_given > rounding)
     return out
+
+
+def _length_on(outline: Segments, lines: npt.NDArray[np.object_], n: int) -> FloatArray:
+    """(n,) length of each outline that lies on some lines."""
+    share = covered_share(find_overlaps(outline, segments_of(lines), SNAP_M), len(outline.line))
+    return np.bincount(outline.line, weights=share * outline.length, minlength=n)
 
 
 def _check(name: str, value: float, limit: float, what: str, bad: IntArray) -> Check:

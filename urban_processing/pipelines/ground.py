@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import shapely
 
 from urban_processing.constraints.ground import divide_land
 from urban_processing.constraints.obstacles import take_off_obstacles
 from urban_processing.constraints.rim import check_entries, place_on_rim, run_lines
-from urban_processing.errors import ParameterError
+from urban_processing.errors import InfeasibleError, ParameterError
 from urban_processing.land import first_layout, simplify_site
 from urban_processing.layout import Layout
+from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.params.base import option_name
 from urban_processing.params.cogenerate import CogenerateParams, ObstacleRim, RimStreet
 from urban_processing.site import Site
@@ -61,6 +63,30 @@ def lay_ground(
         rim_lines=lines,
         obstacle_rim_is_street=params.obstacle_rim is ObstacleRim.STREET,
     )
+
+
+def refuse_islands(layout: Layout, *, min_area: float) -> None:
+    """Make sure that no locked land and no ring of streets stands free within a parcel.
+
+    Raises
+    ------
+    InfeasibleError
+        With one sentence for each parcel that could not be cut through what it surrounds.
+    """
+    mesh = layout.mesh
+    inner = np.ones(len(mesh.loops.face), dtype=bool)
+    inner[mesh.face_loop] = False
+    inner &= mesh.loops.face != OUTSIDE
+    first = mesh.loops.half_edges[mesh.loops.offsets[:-1]]
+    islands = inner & (mesh.face[first ^ 1] != OUTSIDE)
+    around = np.unique(mesh.loops.face[islands])
+    if len(around):
+        raise InfeasibleError(
+            f"Locked land or a ring of given streets lies within {mesh.face_area[f]:.0f} m² that "
+            f"cannot be cut around it into parcels of {min_area:.0f} m²: no street can lead "
+            "there. Give a smaller smallest parcel, or leave it out."
+            for f in around.tolist()
+        )
 
 
 def given_layers(site: Site) -> set[str]:
