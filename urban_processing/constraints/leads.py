@@ -102,17 +102,21 @@ def _rays(work: Linework, blocks: Blocks, leaf: list[int], scale: float, snap: f
             if np.abs(np.angle(known * np.conj(direction))).min() < LEAST_ANGLE:
                 continue
             hit = _hit(z[v], direction, a, b, away)
-            if hit is None or inside[hit[0]]:
+            if hit is None:
                 continue
             k, length = hit
             place = z[v] + length * direction
+            near = _vertex_near(z[v], direction, length + snap, a, b, away, snap)
+            if near is not None and _is_clear(z[v], near[1], a, b, away):
+                k, place, _ = near
+            elif near is not None and near[2] < ON:
+                continue  # it would run over a street that lies in line
+            if inside[k]:
+                continue
             edge = b[k] - a[k]
             slant = 1.0 - abs((np.conj(direction) * edge).imag) / abs(edge)
             cost = length / scale + BEND_COST * abs(degrees) / 90.0 + SKEW_COST * slant
             cost += TREE_COST * (on[k] in blocks.bridges)
-            near = [w for w in (a[k], b[k]) if abs(w - place) <= snap]
-            if near and _is_clear(z[v], near[0], a, b, away):
-                place = near[0]
             rays.append(_Ray(round(cost, 9), v, on[k], complex(place)))
     return sorted(rays, key=lambda r: (r.cost, r.start, r.edge, r.place.real, r.place.imag))
 
@@ -151,6 +155,28 @@ def _hit(
         return None
     k = int(np.argmin(np.where(ok, t, np.inf)))
     return k, float(t[k])
+
+
+def _vertex_near(
+    start: complex,
+    direction: complex,
+    reach: float,
+    a: ComplexArray,
+    b: ComplexArray,
+    away: BoolArray,
+    snap: float,
+) -> tuple[int, complex, float] | None:
+    """The first vertex within a distance of a ray: an edge there, its place, how far off it is."""
+    best = None
+    for ends in (a, b):
+        seen = (ends - start) * np.conj(direction)
+        off = np.abs(seen.imag)
+        ok = away & (seen.real > GRID) & (seen.real <= reach) & (off <= snap)
+        if ok.any():
+            k = int(np.argmin(np.where(ok, seen.real, np.inf)))
+            if best is None or seen.real[k] < best[0]:
+                best = (float(seen.real[k]), k, complex(ends[k]), float(off[k]))
+    return None if best is None else best[1:]
 
 
 def _is_clear(

@@ -361,7 +361,8 @@ def _enclosed(polygons: npt.NDArray[np.object_], chosen: BoolArray, bounds: _Bou
 def _length_on(outline: Segments, lines: npt.NDArray[np.object_], n: int) -> FloatArray:
     """(n,) length of each outline that lies on some lines."""
     share = covered_share(find_overlaps(outline, segments_of(lines), SNAP_M), len(outline.line))
-    return np.bincount(outline.line, weights=share * outline.length, minlength=n)
+    length = share * outline.length
+    return np.asarray(np.bincount(outline.line, weights=length, minlength=n), dtype=np.float64)
 
 
 def _check(name: str, value: float, limit: float, what: str, bad: IntArray) -> Check:
