@@ -115,19 +115,26 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
             dependencies.require_engine(maps=bool(destinations.of_kind(OutputKind.MAP)))
             from qgis_plugin.run import run
 
-            params = self.spec.params.from_values(self._values(parameters, context))
+            params = self.spec.params.from_values(
+                self._values(parameters, context), self._layers(parameters)
+            )
             return run(self, params, destinations, progress_to(feedback), feedback)
 
     def _problems(self, parameters: dict[str, Any], context: QgsProcessingContext) -> list[str]:
         """Say what is wrong with the values, with the names that the dialog shows."""
         values = self._values(parameters, context)
-        problems = self.spec.params.problems_with(values, self._label)
+        problems = self.spec.params.problems_with(values, self._label, self._layers(parameters))
         crs = parameters.get(CRS)
         named = is_given(parameters, CRS) and not isinstance(crs, QgsCoordinateReferenceSystem)
         if named and not self.parameterAsCrs(parameters, CRS, context).isValid():
             label = _QUOTED.format(self.parameterDefinition(CRS).description())
             problems.append(f"{label} is not known: {crs!r}. Give a code such as EPSG:32630.")
         return problems
+
+    def _layers(self, parameters: dict[str, Any]) -> list[str]:
+        """Names of the layers besides the land that were given."""
+        layers = (item.name for item in self.spec.inputs if item.kind.of_site)
+        return [name for name in layers if is_given(parameters, parameter_name(name))]
 
     def _values(self, parameters: dict[str, Any], context: QgsProcessingContext) -> dict[str, Any]:
         """Values of the parameters that were given, as the parameter class takes them."""
@@ -153,9 +160,10 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         return int(number) if field.kind is int and number.is_integer() else number
 
     def _label(self, name: str) -> str:
-        """Return what a parameter is called in the dialog."""
-        fields = {field.name: field for field in self.spec.params.fields()}
-        return _QUOTED.format(fields[name].param.label)
+        """Return what a parameter or an input is called in the dialog."""
+        labels = {field.name: field.param.label for field in self.spec.params.fields()}
+        labels |= {item.name: item.label for item in self.spec.inputs}
+        return _QUOTED.format(labels[name])
 
 
 def tr(text: str) -> str:

@@ -39,6 +39,11 @@ _LAYERS = {
     InputKind.CORNER_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
     InputKind.PARCEL_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.FIXED_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.OBSTACLES: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
 }
 """Inputs that are layers, and their geometry."""
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from qgis.core import (
+    NULL,
     QgsCoordinateReferenceSystem,
     QgsFeatureRequest,
     QgsGeometry,
@@ -28,6 +30,7 @@ from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
 from urban_processing.algorithms.choices import layout_problems
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
+from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
 from urban_processing.intake.sites import build_site
 from urban_processing.layout import Layout
@@ -86,13 +89,25 @@ class Sources:
         if features is None:
             return None
         self.name = self.name or features.name
-        corners = input_of(self.algorithm.spec, InputKind.CORNER_POINTS)
+        layers = {
+            kind: None if layer is None else self._features(layer)
+            for kind in InputKind
+            if kind.of_site
+            for layer in (input_of(self.algorithm.spec, kind),)
+        }
         asked = self.algorithm.parameterAsCrs(self.parameters, CRS, self.context)
         return build_site(
             features,
             library=QgisCrs(self.context.transformContext()),
             asked=asked if asked.isValid() else None,
-            corners=None if corners is None else self._features(corners),
+            corners=layers[InputKind.CORNER_POINTS],
+            given=GivenLayers(
+                fixed_streets=layers[InputKind.FIXED_STREETS],
+                obstacles=layers[InputKind.OBSTACLES],
+                locked=layers[InputKind.LOCKED_LAND],
+                rim_lines=layers[InputKind.RIM_LINES],
+                entries=layers[InputKind.ENTRY_POINTS],
+            ),
         )
 
     def _layout(self, item: Input) -> Layout | None:
@@ -134,21 +149,29 @@ class Sources:
                     self.algorithm.invalidSourceError(self.parameters, name)
                 )
             return None
+        known = source.fields().names()
+        columns = [column for column in GIVEN_COLUMNS if column in known]
+        rows = self._rows(source, name, columns)
         return Features(
-            np.array([*self._geometries(source, name), None], dtype=object)[:-1],
+            _objects([geometry for geometry, _ in rows]),
             source.sourceCrs() if source.sourceCrs().isValid() else None,
             source.sourceName(),
+            columns={
+                column: _objects([values[i] for _, values in rows])
+                for i, column in enumerate(columns)
+            },
         )
 
-    def _geometries(
-        self, source: QgsProcessingFeatureSource, name: str
-    ) -> list[shapely.Geometry | None]:
-        """Read geometries; what is invalid is treated as the user's settings say.
+    def _rows(
+        self, source: QgsProcessingFeatureSource, name: str, columns: Sequence[str]
+    ) -> list[tuple[shapely.Geometry | None, list[Any]]]:
+        """Read geometries and some attributes of the features.
 
-        The settings are followed here: where QGIS itself stops the reading of a layer, its C++
-        exception passes through the Python interpreter and breaks it.
+        What is invalid is treated as the user's settings say. They are followed here: where QGIS
+        itself stops the reading of a layer, its C++ exception passes through the Python
+        interpreter and breaks it.
         """
-        request = QgsFeatureRequest().setNoAttributes()
+        request = QgsFeatureRequest().setSubsetOfAttributes(list(columns), source.fields())
         unchecked = QgsProcessingFeatureSource.Flag.FlagSkipGeometryValidityChecks
         checks = QgsFeatureRequest.InvalidGeometryCheck
         check = self._invalid_geometry_check(name)
@@ -157,7 +180,7 @@ class Sources:
             stop_if_cancelled(self.feedback)
             geometry = feature.geometry()
             if check == checks.GeometryNoCheck or geometry.isNull() or geometry.isGeosValid():
-                found.append(_shapely(geometry))
+                found.append((_shapely(geometry), [_plain(feature[name]) for name in columns]))
                 continue
             what = f"Feature {feature.id()} of “{source.sourceName()}” has an invalid geometry"
             if check == checks.GeometryAbortOnInvalid:
@@ -179,6 +202,15 @@ class Sources:
 
 def _label(spec: AlgorithmSpec, name: str) -> str:
     return next(item.label for item in spec.inputs if item.name == name)
+
+
+def _objects(values: Sequence[Any]) -> npt.NDArray[np.object_]:
+    return np.array([*values, None], dtype=object)[:-1]
+
+
+def _plain(value: Any) -> Any:
+    """Return an attribute's value, None where QGIS has NULL."""
+    return None if value == NULL else value
 
 
 def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:

@@ -19,6 +19,7 @@ from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
+from urban_processing.pipelines.ground import given_layers
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
 
@@ -30,6 +31,11 @@ def cogenerate(
     layer: str | None = None,
     where: str | None = None,
     corners: Source | npt.ArrayLike | None = None,
+    streets: Source | None = None,
+    obstacles: Source | None = None,
+    locked: Source | None = None,
+    rim_lines: Source | None = None,
+    entries: Source | npt.ArrayLike | None = None,
     progress: Progress = SILENT,
     **parameters: Any,
 ) -> GeoLayout:
@@ -42,7 +48,7 @@ def cogenerate(
     ----------
     boundary
         A file, GeoDataFrame, GeoSeries or shapely polygon, or a `Site`.
-    crs, layer, where, corners
+    crs, layer, where, corners, streets, obstacles, locked, rim_lines, entries
         As in `urban_processing.io.boundaries.read_boundary`.
     progress
         Told how far the work is; may stop it.
@@ -70,14 +76,24 @@ def cogenerate(
     >>> bool(layout.parcels.area_m2.min() >= 1500)
     True
     """
+    layers = {
+        "streets": streets,
+        "obstacles": obstacles,
+        "locked": locked,
+        "rim_lines": rim_lines,
+        "entries": entries,
+    }
+    given = [name for name, value in layers.items() if value is not None]
+    if isinstance(boundary, Site):
+        given += given_layers(boundary)
     errors: list[UrbanError] = []
     params, site = None, None
     try:
-        params = CogenerateParams.from_values(parameters)
+        params = CogenerateParams.from_values(parameters, given)
     except ParameterError as error:
         errors.append(error)
     try:
-        site = _site(boundary, crs=crs, layer=layer, where=where, corners=corners)
+        site = _site(boundary, crs=crs, layer=layer, where=where, corners=corners, **layers)
     except BoundaryError as error:
         errors.append(error)
     if params is None or site is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 import shapely
@@ -10,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from urban_processing.errors import BoundaryError
 from urban_processing.land import land_corners
-from urban_processing.layout import EdgeKind, Layout, layout_from_mesh
+from urban_processing.layout import NOT_FIXED, EdgeKind, Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
 from urban_processing.mesh.coverage import Coverage, fit_together
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
@@ -36,6 +38,9 @@ def assemble_layout(
     frame: Frame,
     snap: float,
     min_area: float | None = None,
+    locked: BoolArray | None = None,
+    fixed: IntArray | None = None,
+    obstacles: Sequence[shapely.Polygon] = (),
 ) -> Layout:
     """Make a layout from parcels and street lines in local metres.
 
@@ -54,6 +59,12 @@ def assemble_layout(
         Metres within which things fit.
     min_area
         The smallest parcel allowed, m²; by default the smallest there is.
+    locked
+        (n,) parcels that stay as they are.
+    fixed
+        (m,) entry of `Layout.fixed_streets` that a line is, -1 for others.
+    obstacles
+        What is no land; edges on them are their rims.
 
     Raises
     ------
@@ -73,14 +84,28 @@ def assemble_layout(
         min_area=float(mesh.face_area.min()) if min_area is None else min_area,
         vertex_corner=land_corners(mesh),
         rim_is_street=False,
+        obstacles=obstacles,
     )
     street = _on_lines(mesh, streets, snap)
-    drawn = np.where(layout.edge_kind == EdgeKind.RIM, 0, DRAWN_LEVEL)
+    drawn = np.where(layout.edge_kind == EdgeKind.INTERIOR, DRAWN_LEVEL, 0)
     layout = layout.replace(
-        edge_street=street, edge_level=np.where(street, drawn, -1).astype(np.int16)
+        edge_street=street,
+        edge_level=np.where(street, drawn, -1).astype(np.int16),
+        edge_fixed=np.where(street, _fixed(mesh, streets, fixed, snap), NOT_FIXED),
     )
+    if locked is not None:
+        layout = layout.replace(face_locked=locked[coverage.source])
     issues = [*_fit_issues(coverage, parcels), *_stray_streets(layout, streets, snap)]
     return layout.replace(issues=tuple(issues))
+
+
+def _fixed(mesh: PlanarMesh, streets: ObjectArray, fixed: IntArray | None, snap: float) -> IntArray:
+    """(E,) entry of the given street that an edge runs along, `NOT_FIXED` for none."""
+    out = np.full(mesh.n_edges, NOT_FIXED)
+    given = np.empty(0, dtype=np.int64) if fixed is None else fixed
+    for entry in np.unique(given[given != NOT_FIXED]).tolist():
+        out[_on_lines(mesh, streets[given == entry], snap)] = entry
+    return out
 
 
 def _parts(mesh: PlanarMesh) -> IntArray:

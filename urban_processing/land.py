@@ -9,8 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from urban_processing.errors import BoundaryError
-from urban_processing.layout import Layout, layout_from_mesh
+from urban_processing.constraints.ground import Ground
+from urban_processing.constraints.rim import edges_along
+from urban_processing.errors import BoundaryError, TopologyError
+from urban_processing.layout import EdgeKind, GivenStreet, Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
 from urban_processing.mesh.corners import (
     STRAIGHT_ANGLE,
@@ -18,6 +20,7 @@ from urban_processing.mesh.corners import (
     reported_polygons,
     sharpest_vertex,
 )
+from urban_processing.mesh.places import edges_at, vertices_at
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
@@ -54,18 +57,20 @@ def default_tolerance(min_area: float) -> float:
     return float(SIMPLIFY_SHARE * np.sqrt(min_area))
 
 
-def simplify_site(site: Site, tolerance: float) -> Site:
+def simplify_site(site: Site, tolerance: float, *, keep: FloatArray | None = None) -> Site:
     """Simplify the land's rings and say how much land changed sides.
 
     Inlets and spurs narrower than the tolerance go first; then Douglas–Peucker from the
     sharpest corner of each ring, or between the corners that the user gave, topology kept.
-    Parts that would meet others along a line afterwards stay as they are.
+    Parts that would meet others along a line afterwards stay as they are. Vertices of outer
+    rings at the places `keep` (k, 2) stay like corners.
     """
     if tolerance <= 0:
         return site
     site = place_corners(site, near=FINE_SHARE * tolerance)
     given = list(site.parts)
-    parts = [_simplified(part, tolerance, _own_corners(part, site.corners)) for part in given]
+    fixed = site.corners if keep is None else np.concatenate([site.corners, keep])
+    parts = [_simplified(part, tolerance, _own_corners(part, fixed)) for part in given]
     parts = _kept_apart(given, parts)
     if all(_same_rings(a, b) for a, b in zip(given, parts, strict=True)):
         return site
@@ -298,8 +303,28 @@ def check_parts(parts: Sequence[shapely.Polygon]) -> None:
         )
 
 
-def first_layout(site: Site, *, min_area: float) -> Layout:
-    """One parcel for each part of the land; the rim is street if the site says so.
+def first_layout(
+    site: Site,
+    *,
+    min_area: float,
+    ground: Ground | None = None,
+    rim_lines: Sequence[shapely.LineString] = (),
+    obstacle_rim_is_street: bool = False,
+) -> Layout:
+    """One parcel for each part of the land, or the polygons that its streets divide it into.
+
+    Parameters
+    ----------
+    site
+        The land; where its rim is street, that on `rim_lines` is not, and the other way round.
+    min_area
+        Smallest parcel allowed, m².
+    ground
+        The land divided by given streets and locked land; by default it is not.
+    rim_lines
+        Lines along the outer rings.
+    obstacle_rim_is_street
+        Whether the rims of obstacles are streets.
 
     Raises
     ------
@@ -309,21 +334,72 @@ def first_layout(site: Site, *, min_area: float) -> Layout:
     check_parts(site.parts)
     input_parts = site.input_parts or site.parts
     site = place_corners(site)
-    mesh = mesh_from_polygons(site.parts)
-    corner, few = _given_corners(mesh, site.corners)
-    given = len(site.corners) > 0 and len(few) < mesh.n_faces
+    corner, few = _corners_of(site)
+    given = len(site.corners) > 0 and len(few) < len(site.parts)
+    n_parts = len(site.parts)
+    mesh = mesh_from_polygons(site.parts if ground is None else ground.polygons)
     layout = layout_from_mesh(
         mesh,
         frame=site.frame,
-        face_part=np.arange(len(site.parts)),
+        face_part=np.arange(n_parts) if ground is None else ground.part,
         min_area=min_area,
-        vertex_corner=corner if given else land_corners(mesh),
-        rim_is_street=site.rim_is_street,
+        vertex_corner=vertices_at(mesh.xy, corner),
+        rim_is_street=False,
+        obstacles=site.obstacles,
     )
+    kind = layout.edge_kind
+    street = (kind == EdgeKind.RIM) & (
+        edges_along(mesh, kind, list(rim_lines)) ^ site.rim_is_street
+    )
+    street |= (kind == EdgeKind.OBSTACLE) & obstacle_rim_is_street
     issues = _corner_issues(site, few) if len(site.corners) else []
-    return layout.replace(
-        corners_given=given, issues=(*site.issues, *issues), input_parts=input_parts
+    layout = layout.replace(
+        edge_street=street,
+        edge_level=np.where(street, 0, -1).astype(np.int16),
+        vertex_entry=vertices_at(mesh.xy, site.entries),
+        corners_given=given,
+        issues=(*site.issues, *issues),
+        input_parts=input_parts,
     )
+    return layout if ground is None else _with_ground(layout, ground, site)
+
+
+def _with_ground(layout: Layout, ground: Ground, site: Site) -> Layout:
+    """The layout with its given streets and locked parcels."""
+    edge = edges_at(layout.mesh, ground.segments)
+    if (edge < 0).any():
+        raise TopologyError(
+            f"{int((edge < 0).sum())} pieces of given streets bound no parcel; this is a mistake "
+            "of the software: leave out the streets that end inside the land, and report it."
+        )
+    fixed, street, level = (
+        layout.edge_fixed.copy(),
+        layout.edge_street.copy(),
+        layout.edge_level.copy(),
+    )
+    fixed[edge] = ground.segment_street
+    street[edge], level[edge] = True, 0
+    names = [*layout.land_uses, *dict.fromkeys(each.land_use for each in site.locked)]
+    uses = tuple(dict.fromkeys(names))
+    use = np.array([0, *(uses.index(each.land_use) for each in site.locked)])[ground.locked + 1]
+    return layout.replace(
+        edge_fixed=fixed,
+        edge_street=street,
+        edge_level=level,
+        face_locked=ground.locked >= 0,
+        face_use=use,
+        land_uses=uses,
+        fixed_streets=tuple(GivenStreet(s.street_class, s.width) for s in site.fixed_streets),
+        issues=(*layout.issues, *ground.issues),
+    )
+
+
+def _corners_of(site: Site) -> tuple[FloatArray, dict[int, int]]:
+    """(k, 2) corners of the land, found or given, and parts with too few given ones."""
+    mesh = mesh_from_polygons(site.parts)
+    corner, few = _given_corners(mesh, site.corners)
+    given = len(site.corners) > 0 and len(few) < mesh.n_faces
+    return mesh.xy[corner if given else land_corners(mesh)], few
 
 
 def land_corners(mesh: PlanarMesh) -> BoolArray:

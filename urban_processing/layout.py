@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -29,6 +30,12 @@ class EdgeKind(enum.IntEnum):
     INTERIOR = 0
     RIM = 1
     HOLE = 2
+    OBSTACLE = 3
+    """On the rim of an obstacle that the user gave, also where it touches the outer rim."""
+
+
+ON_OBSTACLE = 1e-5
+"""An edge of the rim within this many metres of an obstacle is on it: vertices are rounded."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,21 @@ class Step:
     input_sha256: str
     seconds: float
     results: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class GivenStreet:
+    """What the user said of a street: `street_class` is empty and `width` NaN for nothing."""
+
+    street_class: str = ""
+    width: float = math.nan
+
+
+PARCEL_USE = "parcel"
+"""Land use of a parcel that nobody gave another use."""
+
+NOT_FIXED = -1
+"""`Layout.edge_fixed` of edges that are no street of the user's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +80,17 @@ class Layout:
         Where the local coordinates lie on the map.
     vertex_corner
         (V,) corners of the land, found or given: they are nodes of the corner graph.
+    vertex_entry
+        (V,) places on the rim where the network meets the outside: nodes as well.
     edge_street
         (E,) whether an edge is a street centreline.
     edge_kind
         (E,) `EdgeKind` of an edge.
     edge_level
         (E,) level at which an edge became street; -1 where it is none.
+    edge_fixed
+        (E,) entry of `fixed_streets` that an edge is on; -1 for all other edges. Such edges
+        stay streets, and stay where they are.
     face_part
         (F,) part of the land that a face belongs to.
     face_level
@@ -73,6 +100,8 @@ class Layout:
         random generator, so that a parcel's cut depends on its own path alone.
     face_locked
         (F,) faces that are not to be cut.
+    face_use
+        (F,) entry of `land_uses`.
     min_area
         The smallest parcel allowed, m².
     street_rules
@@ -85,24 +114,36 @@ class Layout:
         Provenance, oldest step first.
     input_parts
         The polygons as given, in local coordinates.
+    obstacles
+        Polygons in the land as given that are no land, in local coordinates.
+    fixed_streets
+        What the user said of each street that was given.
+    land_uses
+        Names of land uses.
     """
 
     mesh: PlanarMesh
     frame: Frame
     vertex_corner: BoolArray
+    vertex_entry: BoolArray
     edge_street: BoolArray
     edge_kind: npt.NDArray[np.int8]
     edge_level: npt.NDArray[np.int16]
+    edge_fixed: IntArray
     face_part: IntArray
     face_level: IntArray
     face_lineage: npt.NDArray[np.uint64]
     face_locked: BoolArray
+    face_use: IntArray
     min_area: float
     street_rules: StreetRules = field(default_factory=StreetRules)
     corners_given: bool = False
     issues: tuple[Issue, ...] = ()
     history: tuple[Step, ...] = ()
     input_parts: tuple[shapely.Polygon, ...] = ()
+    obstacles: tuple[shapely.Polygon, ...] = ()
+    fixed_streets: tuple[GivenStreet, ...] = ()
+    land_uses: tuple[str, ...] = (PARCEL_USE,)
 
     def __repr__(self) -> str:
         return (
@@ -116,20 +157,23 @@ class Layout:
 
     def with_mesh(self, mesh: PlanarMesh, remap: Remap) -> Layout:
         """Return the layout on an edited mesh; everything known follows the `Remap`."""
-        vertex_corner = np.where(remap.vertex >= 0, self.vertex_corner[remap.vertex], False)
+        old_vertex = remap.vertex >= 0
         new_edge = remap.edge < 0
         face_split = np.bincount(remap.face, minlength=self.mesh.n_faces)[remap.face] > 1
         lineage = self.face_lineage[remap.face]
         return self.replace(
             mesh=mesh,
-            vertex_corner=vertex_corner,
+            vertex_corner=old_vertex & self.vertex_corner[remap.vertex],
+            vertex_entry=old_vertex & self.vertex_entry[remap.vertex],
             edge_street=~new_edge & self.edge_street[remap.edge],
             edge_kind=np.where(new_edge, EdgeKind.INTERIOR, self.edge_kind[remap.edge]),
             edge_level=np.where(new_edge, -1, self.edge_level[remap.edge]).astype(np.int16),
+            edge_fixed=np.where(new_edge, NOT_FIXED, self.edge_fixed[remap.edge]),
             face_part=self.face_part[remap.face],
             face_level=self.face_level[remap.face] + face_split,
             face_lineage=np.where(face_split, _child_lineage(lineage, remap.face), lineage),
             face_locked=self.face_locked[remap.face],
+            face_use=self.face_use[remap.face],
         )
 
     @cached_property
@@ -139,7 +183,13 @@ class Layout:
 
     @property
     def _graph_nodes(self) -> BoolArray:
-        return self.vertex_corner | _street_changes(self.mesh, self.edge_street)
+        nodes = self.vertex_corner | self.vertex_entry
+        nodes |= _changes(self.mesh, self.edge_street)
+        # the chains of the graph are of one kind, and fixed as a whole or not at all
+        for some in (self.edge_kind == EdgeKind.OBSTACLE, self.edge_fixed != NOT_FIXED):
+            if some.any():
+                nodes |= _changes(self.mesh, some)
+        return nodes
 
     @cached_property
     def chain_street(self) -> BoolArray:
@@ -150,6 +200,11 @@ class Layout:
     def chain_kind(self) -> npt.NDArray[np.int8]:
         """(M,) `EdgeKind` of a chain of the corner graph."""
         return self.edge_kind[self.corner_graph.first_edge()]
+
+    @cached_property
+    def chain_fixed(self) -> BoolArray:
+        """(M,) whether a chain of the corner graph is a street that the user gave."""
+        return np.asarray(self.edge_fixed[self.corner_graph.first_edge()] != NOT_FIXED)
 
     @cached_property
     def frontage(self) -> FloatArray:
@@ -189,35 +244,60 @@ def layout_from_mesh(
     min_area: float,
     vertex_corner: BoolArray | None = None,
     rim_is_street: bool = True,
+    obstacles: Sequence[shapely.Polygon] = (),
 ) -> Layout:
     """Wrap a mesh as a layout without history: streets on the rim alone, or none."""
     n_faces = mesh.n_faces
-    kind = edge_kinds(mesh)
+    kind = edge_kinds(mesh, obstacles)
     street = (kind == EdgeKind.RIM) & rim_is_street
     corner = np.zeros(mesh.n_vertices, dtype=bool) if vertex_corner is None else vertex_corner
     return Layout(
         mesh=mesh,
         frame=frame,
         vertex_corner=corner,
+        vertex_entry=np.zeros(mesh.n_vertices, dtype=bool),
         edge_street=street,
         edge_kind=kind,
         edge_level=np.where(street, 0, -1).astype(np.int16),
+        edge_fixed=np.full(mesh.n_edges, NOT_FIXED),
         face_part=np.asarray(face_part, dtype=np.int64),
         face_level=np.zeros(n_faces, dtype=np.int64),
         # far from the ranks that children are told apart by
         face_lineage=splitmix64(np.arange(n_faces).astype(np.uint64) + np.uint64(2**32)),
         face_locked=np.zeros(n_faces, dtype=bool),
+        face_use=np.zeros(n_faces, dtype=np.int64),
         min_area=min_area,
+        obstacles=tuple(obstacles),
     )
 
 
-def edge_kinds(mesh: PlanarMesh) -> npt.NDArray[np.int8]:
-    """(E,) `EdgeKind`: an outside loop that runs clockwise is a rim, the others are holes."""
+def edge_kinds(mesh: PlanarMesh, obstacles: Sequence[shapely.Polygon] = ()) -> npt.NDArray[np.int8]:
+    """(E,) `EdgeKind` by geometry: edges on obstacles, then rims, then holes.
+
+    An outside loop that runs clockwise is a rim, the others are holes.
+    """
     loops = mesh.loops
     kind_of_loop = np.where(mesh.loop_area < 0, EdgeKind.RIM, EdgeKind.HOLE)
     kind_of_loop[loops.face != OUTSIDE] = EdgeKind.INTERIOR
     sides = kind_of_loop[loops.of_half_edge].reshape(-1, 2)
-    return np.asarray(sides.max(axis=1), dtype=np.int8)
+    kind = np.asarray(sides.max(axis=1), dtype=np.int8)
+    if len(obstacles):
+        outer = np.flatnonzero(kind != EdgeKind.INTERIOR)
+        ends = mesh.xy[mesh.origin.reshape(-1, 2)[outer]]
+        places = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1)
+        kind[outer[_lie_on(places, obstacles)]] = EdgeKind.OBSTACLE
+    return kind
+
+
+def _lie_on(places: FloatArray, obstacles: Sequence[shapely.Polygon]) -> BoolArray:
+    """(n,) whether all of (n, 3, 2) places lie at one of the obstacles."""
+    tree = shapely.STRtree(list(obstacles))
+    at, _ = tree.query(
+        shapely.points(places.reshape(-1, 2)), predicate="dwithin", distance=ON_OBSTACLE
+    )
+    near = np.zeros(len(places) * 3, dtype=bool)
+    near[at] = True
+    return np.asarray(near.reshape(-1, 3).all(axis=1))
 
 
 def _child_lineage(parent: npt.NDArray[np.uint64], parent_face: IntArray) -> npt.NDArray[np.uint64]:
@@ -229,9 +309,7 @@ def _child_lineage(parent: npt.NDArray[np.uint64], parent_face: IntArray) -> npt
     return splitmix64(parent ^ splitmix64((rank - first + 1).astype(np.uint64)))
 
 
-def _street_changes(mesh: PlanarMesh, edge_street: BoolArray) -> BoolArray:
-    """(V,) vertices where a street edge meets one that is none, or a street ends."""
-    n_street = np.bincount(
-        mesh.origin, weights=np.repeat(edge_street, 2), minlength=mesh.n_vertices
-    )
-    return np.asarray((n_street > 0) & (n_street < mesh.valence))
+def _changes(mesh: PlanarMesh, chosen: BoolArray) -> BoolArray:
+    """(V,) vertices where a chosen edge meets one that is not."""
+    n_chosen = np.bincount(mesh.origin, weights=np.repeat(chosen, 2), minlength=mesh.n_vertices)
+    return np.asarray((n_chosen > 0) & (n_chosen < mesh.valence))

@@ -9,10 +9,11 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import TopologyError
-from urban_processing.layout import Layout, edge_kinds
+from urban_processing.layout import NOT_FIXED, PARCEL_USE, GivenStreet, Layout, edge_kinds
 from urban_processing.mesh.build import mesh_from_polygons
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh
-from urban_processing.site import Frame, Issue, snap_to_grid
+from urban_processing.mesh.places import edges_at, vertices_at
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.site import Frame, Issue
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +32,16 @@ class LayoutParts:
         (S, 2, 2) ends of the mesh edges that are street.
     segment_level
         (S,) level at which a segment became street.
+    segment_fixed
+        (S,) entry of `fixed_streets` that a segment is on, -1 for others.
     corners
         (C, 2) corners of the land.
+    entries
+        (N, 2) places where the network meets the outside.
+    face_use
+        (F,) entry of `land_uses`.
+    obstacles, fixed_streets, land_uses
+        As in `Layout`.
     """
 
     polygons: npt.NDArray[np.object_]
@@ -42,7 +51,13 @@ class LayoutParts:
     face_locked: BoolArray
     segments: FloatArray
     segment_level: npt.NDArray[np.int16]
+    segment_fixed: IntArray
     corners: FloatArray
+    entries: FloatArray
+    face_use: IntArray
+    obstacles: tuple[shapely.Polygon, ...] = ()
+    fixed_streets: tuple[GivenStreet, ...] = ()
+    land_uses: tuple[str, ...] = (PARCEL_USE,)
 
 
 def canonical(layout: Layout) -> Layout:
@@ -61,7 +76,13 @@ def canonical(layout: Layout) -> Layout:
         face_locked=layout.face_locked,
         segments=mesh.xy[mesh.origin.reshape(-1, 2)[street]],
         segment_level=layout.edge_level[street],
+        segment_fixed=layout.edge_fixed[street],
         corners=mesh.xy[layout.vertex_corner],
+        entries=mesh.xy[layout.vertex_entry],
+        face_use=layout.face_use,
+        obstacles=layout.obstacles,
+        fixed_streets=layout.fixed_streets,
+        land_uses=layout.land_uses,
     )
     rebuilt = rebuild_layout(parts, frame=layout.frame, min_area=layout.min_area)
     if _same_numbering(rebuilt, layout):
@@ -96,58 +117,37 @@ def rebuild_layout(
         If parcels overlap, or a street segment is no edge of a parcel.
     """
     mesh = mesh_from_polygons(list(canonical_rings(parts.polygons)))
-    level = _edge_levels(mesh, parts.segments, parts.segment_level)
+    edge = edges_at(mesh, parts.segments)
+    if (edge < 0).any():
+        raise TopologyError(
+            f"{int((edge < 0).sum())} pieces of street do not lie on parcel boundaries."
+        )
+    level = np.full(mesh.n_edges, -1, dtype=np.int16)
+    level[edge] = parts.segment_level
+    fixed = np.full(mesh.n_edges, NOT_FIXED)
+    fixed[edge] = parts.segment_fixed
     return Layout(
         mesh=mesh,
         frame=frame,
-        vertex_corner=_at(mesh.xy, parts.corners),
+        vertex_corner=vertices_at(mesh.xy, parts.corners),
+        vertex_entry=vertices_at(mesh.xy, parts.entries),
         edge_street=level >= 0,
-        edge_kind=edge_kinds(mesh),
+        edge_kind=edge_kinds(mesh, parts.obstacles),
         edge_level=level,
+        edge_fixed=fixed,
         face_part=np.asarray(parts.face_part, dtype=np.int64),
         face_level=np.asarray(parts.face_level, dtype=np.int64),
         face_lineage=np.asarray(parts.face_lineage, dtype=np.uint64),
         face_locked=np.asarray(parts.face_locked, dtype=bool),
+        face_use=np.asarray(parts.face_use, dtype=np.int64),
         min_area=min_area,
         issues=issues,
+        obstacles=parts.obstacles,
+        fixed_streets=parts.fixed_streets,
+        land_uses=parts.land_uses,
     )
 
 
 def canonical_rings(polygons: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
     """Start every ring at its lowest vertex; shells counter-clockwise."""
     return np.asarray(shapely.orient_polygons(shapely.normalize(polygons)), dtype=object)
-
-
-def _edge_levels(
-    mesh: PlanarMesh, segments: FloatArray, level: npt.NDArray[np.int16]
-) -> npt.NDArray[np.int16]:
-    """(E,) level of the street segment that lies on each edge, -1 for none."""
-    edges = mesh.xy[mesh.origin.reshape(-1, 2)]
-    keys = _sorted_ends(np.concatenate([edges, snap_to_grid(segments)]))
-    unique, index = np.unique(keys, axis=0, return_inverse=True)
-    edge_of = np.full(len(unique), -1)
-    index = index.ravel()
-    edge_of[index[: mesh.n_edges]] = np.arange(mesh.n_edges)
-    hit = edge_of[index[mesh.n_edges :]]
-    if (hit < 0).any():
-        raise TopologyError(
-            f"{int((hit < 0).sum())} pieces of street do not lie on parcel boundaries."
-        )
-    out = np.full(mesh.n_edges, -1, dtype=np.int16)
-    out[hit] = level
-    return out
-
-
-def _sorted_ends(segments: FloatArray) -> FloatArray:
-    """(n, 4) ends of segments, the lower one first."""
-    a, b = segments[:, 0] + 0.0, segments[:, 1] + 0.0  # no negative zeros
-    swap = (a[:, 0] > b[:, 0]) | ((a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1]))
-    return np.hstack([np.where(swap[:, None], b, a), np.where(swap[:, None], a, b)])
-
-
-def _at(xy: FloatArray, places: FloatArray) -> BoolArray:
-    """(V,) which vertices lie exactly at one of some places."""
-    keys = np.concatenate([xy, snap_to_grid(places).reshape(-1, 2)]) + 0.0
-    _, index = np.unique(keys, axis=0, return_inverse=True)
-    index = index.ravel()
-    return np.isin(index[: len(xy)], index[len(xy) :])

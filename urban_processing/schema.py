@@ -199,14 +199,28 @@ STREETS = Layer(
         _integer("edge_id", "Edge", "Number of the network edge, counted from 1."),
         _integer("street_id", "Street", "Number of the street that the edge belongs to."),
         _PART,
-        _text("class", "Class", "rim, fixed, collector, local or cul_de_sac."),
-        _integer("level", "Level", "Level at which the street was laid out; 0 for the rim."),
+        _text(
+            "class",
+            "Class",
+            "rim, collector, local or cul_de_sac; of a given street its own, or else fixed.",
+        ),
+        _integer(
+            "level",
+            "Level",
+            "Level at which the street was laid out; 0 for the rim and for given streets.",
+        ),
         _real("width_m", "Width", "Nominal width of the right-of-way.", unit="m"),
         _real("length_m", "Length", "Length of the centreline.", unit="m"),
         _integer(
             "from_junction", "From", "Junction or end at its start; none on a ring.", nullable=True
         ),
         _integer("to_junction", "To", "Junction or end at its end; none on a ring.", nullable=True),
+        _integer(
+            "fixed_id",
+            "Given street",
+            "Number of the given street that it lies on, counted from 1; empty for all others.",
+            nullable=True,
+        ),
     ),
     "Streets",
     shown=True,
@@ -319,7 +333,7 @@ LAYERS: tuple[Layer, ...] = (
 )
 """All layers, in the order in which a file lists them."""
 
-LAID_OUT: tuple[Layer, ...] = tuple(layer for layer in LAYERS if layer is not OBSTACLES)
+LAID_OUT: tuple[Layer, ...] = LAYERS
 """Layers that a layout can have at present."""
 
 _BY_NAME = {layer.name: layer for layer in LAYERS}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,6 +50,26 @@ class Issue:
 
 
 @dataclass(frozen=True)
+class FixedStreet:
+    """A street that the user gives: its line in local metres, and what is known of it.
+
+    `street_class` is empty and `width` NaN where the user says nothing.
+    """
+
+    line: shapely.LineString
+    street_class: str = ""
+    width: float = math.nan
+
+
+@dataclass(frozen=True)
+class LockedLand:
+    """Land that stays one parcel, such as an estate that is there already."""
+
+    polygon: shapely.Polygon
+    land_use: str = "locked"
+
+
+@dataclass(frozen=True)
 class Site:
     """The land, validated and in local metres.
 
@@ -70,6 +91,16 @@ class Site:
         What reading and repairing the boundary has to say.
     input_sha256
         Hash of the input, for provenance.
+    obstacles
+        Valid polygons that no cut and no street crosses: they are no land.
+    locked
+        Land that is not cut.
+    fixed_streets
+        Streets that belong to the network from the start.
+    rim_lines
+        Lines along the outer rings that say which part of the rim is street, or is not.
+    entries
+        (k, 2) places on the rim where the network meets the outside.
     """
 
     parts: tuple[shapely.Polygon, ...]
@@ -79,6 +110,11 @@ class Site:
     input_parts: tuple[shapely.Polygon, ...] = ()
     issues: tuple[Issue, ...] = ()
     input_sha256: str = ""
+    obstacles: tuple[shapely.Polygon, ...] = ()
+    locked: tuple[LockedLand, ...] = ()
+    fixed_streets: tuple[FixedStreet, ...] = ()
+    rim_lines: tuple[shapely.LineString, ...] = ()
+    entries: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def area(self) -> float:

@@ -117,6 +117,11 @@ def limit(value: float) -> float | None:
 INPUTS = {
     InputKind.BOUNDARY: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.CORNER_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.FIXED_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.OBSTACLES: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
     InputKind.PARCEL_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
 }

@@ -174,6 +174,45 @@ def test_corners_come_from_a_layer_of_points(run: Run, layer: Any, feedback: Any
         run(land, PARCELS=10, CORNERS=far, OUTPUT_PARCELS=TEMPORARY)
 
 
+def test_streets_obstacles_and_entries_come_from_layers(run: Run, layer: Any) -> None:
+    land = layer([square(300)])
+    x, y = 690_000.0, 5_700_000.0
+    roads = layer(
+        [f"LINESTRING ({x - 9} {y + 100}, {x + 309} {y + 120})"] * 2,
+        kind="LineString",
+        fields="&field=class:string&field=width_m:double",
+    )
+    first = next(iter(roads.getFeatures())).id()
+    roads.dataProvider().changeAttributeValues({first: {0: "main road", 1: 21.5}})
+    lake = layer([square(60, x=x + 200, y=y + 200)])
+    gate = layer([f"POINT ({x} {y + 50})"], kind="Point")
+    outcome = run(
+        land,
+        PARCELS=20,
+        STREETS=roads,
+        OBSTACLES=lake,
+        ENTRIES=gate,
+        OUTPUT_STREETS=TEMPORARY,
+        OUTPUT_OBSTACLES=TEMPORARY,
+        OUTPUT_JUNCTIONS=TEMPORARY,
+    )
+    streets = outcome["OUTPUT_STREETS"]
+    given = [f for f in streets.getFeatures() if str(f["fixed_id"]) != "NULL"]
+    assert {(f["class"], f["width_m"]) for f in given} == {("main road", 21.5)}
+    (water,) = shapes(outcome["OUTPUT_OBSTACLES"])
+    assert water.area == pytest.approx(3600, rel=1e-6)
+    assert "entry" in {f["kind"] for f in outcome["OUTPUT_JUNCTIONS"].getFeatures()}
+
+
+def test_contradictions_of_layers_and_values_are_said_in_the_dialogs_words(
+    run: Run, layer: Any
+) -> None:
+    land = layer([square(300)])
+    edge = layer(["LINESTRING (690000 5700000, 690300 5700000)"], kind="LineString")
+    with pytest.raises(Exception, match=r"“Streets on the rim” none speaks.*“Rim lines”"):
+        run(land, PARCELS=9, RIM=1, RIM_LINES=edge, OUTPUT_PARCELS=TEMPORARY)
+
+
 def test_multipolygons_heights_and_curves_are_read(run: Run, layer: Any) -> None:
     land = layer(
         [

@@ -140,7 +140,8 @@ def test_json_schema_of_all_kinds_of_fields() -> None:
 def test_the_description_is_plain_json() -> None:
     described = description(get("cogenerate"))
     assert json.loads(json.dumps(described)) == described
-    assert [i["name"] for i in described["inputs"]] == ["boundary", "corners"]
+    layers = ["corners", "streets", "obstacles", "locked", "rim_lines", "entries"]
+    assert [i["name"] for i in described["inputs"]] == ["boundary", *layers]
     assert described["outputs"][1] == {
         "name": "plot",
         "kind": "map",

@@ -111,13 +111,15 @@ def test_rule_implies_the_published_definition() -> None:
 
 
 def test_unreached_parcels_form_groups_across_shared_chains() -> None:
-    # the inner 3 x 3 of 5 x 5 parcels; locking its cross leaves its four corners apart
+    # the inner 3 x 3 of 5 x 5 parcels; without its cross its four corners apart
     layout = make_layout(boxes(5, 5))
     state = StreetState(layout, PARAMS)
     unreached = unreached_parcels(state)
     assert unreached == [6, 7, 8, 11, 12, 13, 16, 17, 18]
     assert group_parcels(state, unreached) == [unreached]
-    apart = StreetState(make_layout(boxes(5, 5), locked={7, 11, 12, 13, 17}), PARAMS)
+    apart = StreetState(layout, PARAMS)
+    for f in (7, 11, 12, 13, 17):
+        apart.need[f] = 0.0
     assert group_parcels(apart, unreached_parcels(apart)) == [[6], [8], [16], [18]]
 
 
@@ -135,8 +137,9 @@ def test_one_straight_street_reaches_two_rows() -> None:
 def test_bent_group_gets_an_l_shaped_access() -> None:
     # parcels of an L within 5 x 5 others that need no access
     bent = {6, 7, 8, 13, 18}
-    layout = make_layout(boxes(5, 5), locked=set(range(25)) - bent)
-    state = StreetState(layout, PRINTED)
+    state = StreetState(make_layout(boxes(5, 5)), PRINTED)
+    for f in set(range(25)) - bent:
+        state.need[f] = 0.0
     (access,) = find_accesses(
         state, sorted(bent), state.network_distance(), keep_ends=False, count=1
     )
@@ -349,10 +352,29 @@ def test_layout_without_need_is_returned_as_it_is() -> None:
     assert extend_streets(layout, PARAMS, level=1, keep_ends=False) is layout
 
 
-def test_locked_parcels_need_no_access() -> None:
+def test_locked_parcels_are_reached_like_others() -> None:
     inner = {5, 6, 9, 10}
     layout = make_layout(boxes(4, 4), locked=inner)
-    assert extend_streets(layout, PARAMS, level=1, keep_ends=False) is layout
+    assert reached(extend_streets(layout, PARAMS, level=1, keep_ends=False)).all()
+
+
+def test_streets_that_were_given_stay() -> None:
+    # a street across 4 x 4 parcels with a dead end beside it, which nobody needs
+    layout = make_layout(boxes(4, 4))
+    state = StreetState(layout, PARAMS)
+    across = lay(state, (0, 20), (10, 20), (20, 20), (30, 20), (40, 20))
+    stub = lay(state, (10, 20), (10, 30))
+    drawn = state.finish(level=1)
+    fixed = np.full(layout.mesh.n_edges, -1)
+    fixed[state.graph.edges_of([*across, *stub])] = 0
+    given = drawn.replace(edge_fixed=fixed)
+    for keep_ends in (False, True):
+        after = prune_streets(
+            extend_streets(given, PARAMS, level=2, keep_ends=keep_ends), PARAMS, keep_ends=keep_ends
+        )
+        assert after.edge_street[fixed >= 0].all()
+    plain = prune_streets(drawn, PARAMS, keep_ends=True)
+    assert not plain.edge_street[state.graph.edges_of(stub)].any()
 
 
 def test_bridge_between_two_blocks_at_a_bare_rim_stays() -> None:

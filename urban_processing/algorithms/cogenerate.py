@@ -37,7 +37,9 @@ COGENERATE = AlgorithmSpec(
         "reached and the network stays connected. In the end the geometry is optimized: streets "
         "and parcel sides become smoother, parcels and junctions more regular.\n\n"
         "Each connected part of the land gets a layout and a network of its own. Holes stay "
-        "empty. The rim of the land is street."
+        "empty. The rim of the land is street, as a whole unless told otherwise. Streets that are "
+        "given belong to the network from the start; no cut and no street crosses obstacles or "
+        "locked land."
     ),
     params=CogenerateParams,
     inputs=(
@@ -55,6 +57,45 @@ COGENERATE = AlgorithmSpec(
             "by default corners are found by angle.",
             required=False,
         ),
+        Input(
+            name="streets",
+            kind=InputKind.FIXED_STREETS,
+            label="Given streets",
+            help="Lines of streets that are part of the network from the start and stay where they "
+            "are; their class and width are kept (columns class, width_m).",
+            required=False,
+        ),
+        Input(
+            name="obstacles",
+            kind=InputKind.OBSTACLES,
+            label="Obstacles",
+            help="Polygons that no cut and no street crosses: lakes, parks, protected land.",
+            required=False,
+        ),
+        Input(
+            name="locked",
+            kind=InputKind.LOCKED_LAND,
+            label="Locked land",
+            help="Polygons that stay one parcel each and are reached by street, such as an "
+            "estate that is there already; their use is kept (column land_use).",
+            required=False,
+        ),
+        Input(
+            name="rim_lines",
+            kind=InputKind.RIM_LINES,
+            label="Rim lines",
+            help="Lines along the boundary that say which part of the rim is street, or is not; "
+            "see the parameter for streets on the rim.",
+            required=False,
+        ),
+        Input(
+            name="entries",
+            kind=InputKind.ENTRY_POINTS,
+            label="Entries",
+            help="Points near the boundary where the network meets the outside; where the rim is "
+            "no street and there is none, the best place is chosen.",
+            required=False,
+        ),
     ),
     outputs=LAYOUT_OUTPUTS,
     run=_run,
@@ -68,6 +109,8 @@ COGENERATE = AlgorithmSpec(
     examples=(
         "sample_data/wandsworth.gpkg -o layout.gpkg --parcels 500 --plot layout.png",
         "land.shp -o layout.gpkg --min-area 800 --pattern cul-de-sac",
+        "land.shp -o layout.gpkg --min-area 800 --streets roads.gpkg --obstacles lakes.gpkg",
+        "land.shp -o layout.gpkg --min-area 800 --rim none --entries gate.geojson --pattern tree",
         '--place "Schaan, Liechtenstein" -o schaan.gpkg --min-area 600',
     ),
 )

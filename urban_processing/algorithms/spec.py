@@ -23,6 +23,16 @@ class InputKind(enum.StrEnum):
     CORNER_POINTS = "corner points"
     """Points on the boundary that count as corners of the land; they become a part of the
     `Site` of the boundary, not a value of their own."""
+    FIXED_STREETS = "lines of streets"
+    """Streets that the network begins with; a part of the `Site`, as the four that follow."""
+    OBSTACLES = "polygons of obstacles"
+    """What no cut and no street crosses."""
+    LOCKED_LAND = "polygons of locked land"
+    """What stays a parcel."""
+    RIM_LINES = "lines along the rim"
+    """Lines that say which part of the rim is street, or is not."""
+    ENTRY_POINTS = "entry points"
+    """Where the network meets the outside."""
     LAYOUT = "layout"
     """A layout made before, as a file; handed over as a `Layout`."""
     PARCEL_LAYER = "parcel layer"
@@ -30,6 +40,21 @@ class InputKind(enum.StrEnum):
     over in its place."""
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
+
+    @property
+    def of_site(self) -> str:
+        """Name of the argument of `read_boundary` that takes such an input; empty for others."""
+        return _OF_SITE.get(self, "")
+
+
+_OF_SITE = {
+    InputKind.CORNER_POINTS: "corners",
+    InputKind.FIXED_STREETS: "streets",
+    InputKind.OBSTACLES: "obstacles",
+    InputKind.LOCKED_LAND: "locked",
+    InputKind.RIM_LINES: "rim_lines",
+    InputKind.ENTRY_POINTS: "entries",
+}
 
 
 class OutputKind(enum.StrEnum):

@@ -38,7 +38,8 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
     """
     names = [field.name for field in spec.params.fields()]
     values = {name: given[name] for name in names if given[name] is not None}
-    problems = spec.params.problems_with(values)
+    layers = [i.name for i in spec.inputs if i.kind.of_site and given[i.name] is not None]
+    problems = spec.params.problems_with(values, layers=layers)
     problems += _output_problems(spec, given)
     inputs: dict[str, Any] = {}
     for item in spec.inputs:
@@ -132,13 +133,12 @@ def _boundary(
         source = fetch_place(place)
     from urban_processing.io.boundaries import read_boundary
 
-    corners = [i.name for i in spec.inputs if i.kind is InputKind.CORNER_POINTS]
     return read_boundary(
         source,
         layer=None if place is not None else given["layer"],
         where=None if place is not None else given["where"],
         crs=given["crs"],
-        corners=given[corners[0]] if corners else None,
+        **{i.kind.of_site: given[i.name] for i in spec.inputs if i.kind.of_site},
     )
 
 

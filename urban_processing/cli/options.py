@@ -87,7 +87,7 @@ def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
 
 
 def _input_parameters(item: Input) -> list[click.Parameter]:
-    if item.kind in (InputKind.CORNER_POINTS, InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
+    if item.kind.of_site or item.kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
     argument = HelpArgument(
         [item.name],

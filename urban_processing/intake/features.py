@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +27,20 @@ class Features(Generic[C]):
         What to call the source in messages.
     bare
         Whether the source cannot carry a CRS (shapely geometries).
+    columns
+        (n,) values of those attributes that were asked for and are there, by name.
     """
 
     geometry: npt.NDArray[np.object_]
     crs: C | None
     name: str
     bare: bool = False
+    columns: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+
+    def present(self) -> list[int]:
+        """Rows that have a geometry."""
+        return [i for i, g in enumerate(self.geometry) if g is not None and not g.is_empty]
+
+    def column(self, *names: str) -> npt.NDArray[Any] | None:
+        """Return the values of the first of some attributes that is there."""
+        return next((self.columns[name] for name in names if name in self.columns), None)

@@ -13,6 +13,7 @@ import shapely
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.crs_choice import CrsLibrary, choose_crs, crs_label
 from urban_processing.intake.features import Features
+from urban_processing.intake.given import GivenLayers
 from urban_processing.intake.polygons import Cleaned, clean_polygons
 from urban_processing.intake.projection import Projection
 from urban_processing.site import GRID, FloatArray, Frame, Issue, Site, snap_to_grid
@@ -39,6 +40,7 @@ def build_site(
     library: CrsLibrary[C],
     asked: C | None = None,
     corners: Features[C] | None = None,
+    given: GivenLayers[C] | None = None,
     problems: Sequence[str] = (),
 ) -> Site:
     """Make land boundaries ready for the engine.
@@ -57,6 +59,8 @@ def build_site(
         Projected, metric CRS to work in; the CRS of features that have none.
     corners
         Points at the corners of a freeform land.
+    given
+        Streets, obstacles and other layers that constrain the layout.
     problems
         What is wrong already: raised with all else that is.
 
@@ -68,6 +72,8 @@ def build_site(
     found = [*problems]
     if corners is not None:
         found += _corner_problems(corners)
+    if given is not None:
+        found += given.problems()
     if features is None:
         raise BoundaryError(found)
     issues: list[Issue] = []
@@ -89,7 +95,7 @@ def build_site(
         input_sha256=_digest(cleaned.input_parts, "" if own is None else library.text(own)),
     )
     _check_size(site)
-    return site
+    return site if given is None else given.put_into(site, projection)
 
 
 def _source_crs(
@@ -250,16 +256,12 @@ def _digest(polygons: npt.NDArray[np.object_], crs: str) -> str:
 
 
 def _corner_problems(corners: Features[C]) -> list[str]:
-    usable = _present(corners)
-    if not usable or {g.geom_type for g in usable} - {"Point", "MultiPoint"}:
+    usable = corners.geometry[corners.present()]
+    if not len(usable) or {g.geom_type for g in usable} - {"Point", "MultiPoint"}:
         return ["Corners must be points; give a point layer or an array (k, 2)."]
     if not np.isfinite(shapely.get_coordinates(usable)).all():
         return ["Corners: a coordinate is not finite."]
     return []
-
-
-def _present(features: Features[C]) -> list[shapely.Geometry]:
-    return [g for g in features.geometry if g is not None and not g.is_empty]
 
 
 def _local_corners(
@@ -271,7 +273,7 @@ def _local_corners(
     """Corners in local coordinates, checked to lie near the rim."""
     if features is None:
         return np.empty((0, 2))
-    xy = shapely.get_coordinates(_present(features))
+    xy = shapely.get_coordinates(features.geometry[features.present()])
     local = snap_to_grid(projection.of(features).points(xy) - origin)
     rim = shapely.union_all([p.exterior for p in parts])
     distance = shapely.distance(shapely.points(local), rim)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from os import PathLike, fspath
+
 import numpy as np
 import numpy.typing as npt
 import pyproj
@@ -9,6 +11,7 @@ import shapely
 
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
+from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.sites import build_site
 from urban_processing.io.crs import PYPROJ, parse_crs
 from urban_processing.io.features import Source, read_features
@@ -22,6 +25,11 @@ def read_boundary(
     where: str | None = None,
     crs: object = None,
     corners: Source | npt.ArrayLike | None = None,
+    streets: Source | None = None,
+    obstacles: Source | None = None,
+    locked: Source | None = None,
+    rim_lines: Source | None = None,
+    entries: Source | npt.ArrayLike | None = None,
 ) -> Site:
     """Read land boundaries and make them ready for the engine.
 
@@ -45,6 +53,18 @@ def read_boundary(
     corners
         Points at the corners of a freeform land, as any `source`, or an array (k, 2) of
         coordinates in the CRS of `source`.
+    streets
+        Lines of streets that the network begins with, as any `source` in any CRS; columns
+        ``class`` and ``width_m`` (or ``width``) are kept. Of a file with several layers the one
+        with lines is taken, or that named as in ``file.gpkg|layername=roads``.
+    obstacles
+        Polygons that no cut and no street crosses.
+    locked
+        Polygons that stay one parcel each; a column ``land_use`` is kept.
+    rim_lines
+        Lines along the rim of the land that say which part of it is street, or is not.
+    entries
+        Points on the rim where the network meets the outside, or an array (k, 2).
 
     Returns
     -------
@@ -66,9 +86,21 @@ def read_boundary(
     problems: list[str] = []
     asked = _asked_crs(crs, problems)
     features = _read(source, layer, where, problems)
-    given_corners = _read_corners(corners, problems)
+    given_corners = _read_points(corners, "Corners", problems)
+    given = GivenLayers(
+        fixed_streets=_read_given(streets, "Fixed streets", "line", problems),
+        obstacles=_read_given(obstacles, "Obstacles", "polygon", problems),
+        locked=_read_given(locked, "Locked land", "polygon", problems),
+        rim_lines=_read_given(rim_lines, "Rim lines", "line", problems),
+        entries=_read_points(entries, "Entries", problems),
+    )
     return build_site(
-        features, library=PYPROJ, asked=asked, corners=given_corners, problems=problems
+        features,
+        library=PYPROJ,
+        asked=asked,
+        corners=given_corners,
+        given=given,
+        problems=problems,
     )
 
 
@@ -92,27 +124,48 @@ def _asked_crs(crs: object, problems: list[str]) -> pyproj.CRS | None:
         return None
 
 
-def _read_corners(
-    corners: Source | npt.ArrayLike | None, problems: list[str]
+def _read_points(
+    points: Source | npt.ArrayLike | None, name: str, problems: list[str]
 ) -> Features[pyproj.CRS] | None:
-    if corners is None:
+    if points is None:
         return None
     try:
-        return read_features(_as_points(corners))
+        return _read_layer(_as_points(points), "point")
     except BoundaryError as error:
-        problems += [f"Corners: {problem}" for problem in error.problems]
+        problems += [f"{name}: {problem}" for problem in error.problems]
         return None
 
 
-def _as_points(corners: Source | npt.ArrayLike) -> Source:
-    if isinstance(corners, list | tuple | np.ndarray) and not any(
-        isinstance(item, shapely.Geometry) for item in corners
+def _read_given(
+    source: Source | None, name: str, kind: str, problems: list[str]
+) -> Features[pyproj.CRS] | None:
+    if source is None:
+        return None
+    try:
+        return _read_layer(source, kind)
+    except BoundaryError as error:
+        problems += [f"{name}: {problem}" for problem in error.problems]
+        return None
+
+
+def _read_layer(source: Source, kind: str) -> Features[pyproj.CRS]:
+    """Read a layer with geometries of a kind; its file may be followed by a layer's name."""
+    layer = None
+    if isinstance(source, str | PathLike):
+        path, _, name = fspath(source).partition("|layername=")
+        source, layer = path, name or None
+    return read_features(source, layer=layer, kind=kind, columns=GIVEN_COLUMNS)
+
+
+def _as_points(points: Source | npt.ArrayLike) -> Source:
+    if isinstance(points, list | tuple | np.ndarray) and not any(
+        isinstance(item, shapely.Geometry) for item in points
     ):
         try:
-            xy = np.asarray(corners, dtype=np.float64)
+            xy = np.asarray(points, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise BoundaryError("they must be an array (k, 2) of coordinates.") from error
         if xy.ndim != 2 or xy.shape[1] != 2:
             raise BoundaryError(f"they must be an array (k, 2); got shape {xy.shape}.")
         return shapely.points(xy)
-    return corners
+    return points

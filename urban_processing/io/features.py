@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -28,7 +29,12 @@ _PREFERRED_LAYER = "boundary"
 
 
 def read_features(
-    source: Source, *, layer: str | None = None, where: str | None = None
+    source: Source,
+    *,
+    layer: str | None = None,
+    where: str | None = None,
+    kind: str = "polygon",
+    columns: Sequence[str] = (),
 ) -> Features[pyproj.CRS]:
     """Read the features of a file, or take those of a frame or of shapely geometries.
 
@@ -40,6 +46,10 @@ def read_features(
         Layer of a file that has several.
     where
         Filter on attributes, as after WHERE in SQL.
+    kind
+        Geometry that is looked for where a file has several layers: polygon, line or point.
+    columns
+        Attributes that are wanted where the source has them.
 
     Raises
     ------
@@ -49,16 +59,27 @@ def read_features(
     if isinstance(source, str | PathLike):
         path = fspath(source)
         if path.lower().endswith(PARQUET):
-            return _read_parquet(path, layer, where)
-        return _read_file(path, layer, where)
+            return _read_parquet(path, layer, where, columns)
+        return _read_file(path, layer, where, kind, columns)
     if layer is not None or where is not None:
         raise BoundaryError(
             "layer and where choose features of a file; select the rows of a frame before."
         )
     geometry = getattr(source, "geometry", None)
     if geometry is not None and hasattr(source, "crs"):
-        return Features(np.asarray(geometry, dtype=object), _usable(source.crs), "The frame")
+        return Features(
+            np.asarray(geometry, dtype=object),
+            _usable(source.crs),
+            "The frame",
+            columns=_columns_of(source, columns),
+        )
     return Features(_as_geometries(source), None, "The geometry", bare=True)
+
+
+def _columns_of(frame: Any, columns: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
+    """Wanted columns of a GeoDataFrame; a GeoSeries has none."""
+    known = getattr(frame, "columns", ())
+    return {name: np.asarray(frame[name], dtype=object) for name in columns if name in known}
 
 
 def _as_geometries(source: Any) -> npt.NDArray[np.object_]:
@@ -92,7 +113,9 @@ def _must_exist(path: str) -> None:
         raise BoundaryError(f"{path} is a folder: give the file in it.")
 
 
-def _read_parquet(path: str, layer: str | None, where: str | None) -> Features[pyproj.CRS]:
+def _read_parquet(
+    path: str, layer: str | None, where: str | None, columns: Sequence[str]
+) -> Features[pyproj.CRS]:
     import geopandas
 
     _must_exist(path)
@@ -107,15 +130,27 @@ def _read_parquet(path: str, layer: str | None, where: str | None) -> Features[p
         raise DependencyError("GeoParquet needs the package pyarrow: install it.") from error
     except (ValueError, OSError) as error:
         raise BoundaryError(f"{path} cannot be read as GeoParquet: {_first_line(error)}") from error
-    return Features(np.asarray(frame.geometry, dtype=object), _usable(frame.crs), path)
+    return Features(
+        np.asarray(frame.geometry, dtype=object),
+        _usable(frame.crs),
+        path,
+        columns=_columns_of(frame, columns),
+    )
 
 
-def _read_file(path: str, layer: str | None, where: str | None) -> Features[pyproj.CRS]:
+def _read_file(
+    path: str, layer: str | None, where: str | None, kind: str, columns: Sequence[str]
+) -> Features[pyproj.CRS]:
     _must_exist(path)
-    layer = _choose_layer(path, layer)
+    layer = _choose_layer(path, layer, kind)
     try:
-        meta, _, wkb, _ = pyogrio.raw.read(
-            path, layer=layer, where=where, columns=[], force_2d=True, read_geometry=True
+        meta, _, wkb, values = pyogrio.raw.read(
+            path,
+            layer=layer,
+            where=where,
+            columns=list(columns),
+            force_2d=True,
+            read_geometry=True,
         )
     except (DataSourceError, DataLayerError, FieldError, GeometryError, ValueError) as error:
         if where is not None:
@@ -129,11 +164,13 @@ def _read_file(path: str, layer: str | None, where: str | None) -> Features[pypr
     crs = _usable(meta["crs"])
     with np.errstate(invalid="ignore"):  # coordinates that are not finite are told of later
         geometry = np.asarray(shapely.from_wkb(wkb), dtype=object)
-    return Features(geometry, crs, path)
+    return Features(
+        geometry, crs, path, columns=dict(zip(meta["fields"].tolist(), values, strict=True))
+    )
 
 
-def _choose_layer(path: str, layer: str | None) -> str:
-    """Return the layer asked for, else the only one that can hold polygons."""
+def _choose_layer(path: str, layer: str | None, wanted: str) -> str:
+    """Return the layer asked for, else the only one that can hold the wanted geometries."""
     try:
         layers = pyogrio.list_layers(path)
     except DataSourceError as error:
@@ -146,21 +183,32 @@ def _choose_layer(path: str, layer: str | None) -> str:
             raise BoundaryError(f"{path} has no layer {layer!r}; its layers are {_listed(names)}.")
         return layer
     spatial = [str(name) for name, kind in layers if kind is not None]
-    polygons = [str(name) for name, kind in layers if kind is not None and _may_hold_polygons(kind)]
-    candidates = polygons or spatial or names
-    if _PREFERRED_LAYER in candidates:
+    fitting = [str(name) for name, kind in layers if kind is not None and _may_hold(kind, wanted)]
+    candidates = fitting or spatial or names
+    if wanted == "polygon" and _PREFERRED_LAYER in candidates:
         return _PREFERRED_LAYER
     if len(candidates) != 1:
+        how = "with layer (--layer)" if wanted == "polygon" else f"as in {path}|layername=NAME"
         raise BoundaryError(
-            f"{path} has several layers: {_listed(candidates)}. Choose one with layer (--layer)."
+            f"{path} has several layers: {_listed(candidates)}. Choose one {how}."
             if candidates
             else f"{path} has no layers."
         )
     return candidates[0]
 
 
-def _may_hold_polygons(kind: str) -> bool:
-    return any(word in kind for word in ("Polygon", "Surface", "Unknown", "Collection", "TIN"))
+_HOLDING = {
+    "polygon": ("Polygon", "Surface", "TIN"),
+    "line": ("Line", "Curve"),
+    "point": ("Point",),
+}
+
+
+def _may_hold(kind: str, wanted: str) -> bool:
+    """Whether a layer of a kind may hold the wanted geometries."""
+    words = (*_HOLDING[wanted], "Unknown", "Collection")
+    fits = any(word in kind for word in words)
+    return fits and not (wanted == "line" and "Polygon" in kind)
 
 
 def _columns(path: str, layer: str) -> str:

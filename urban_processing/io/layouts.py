@@ -38,9 +38,12 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
     """
     problems: list[str] = []
     found = []
-    for called, source, layer in (("Parcels", parcels, PARCELS), ("Streets", streets, STREETS)):
+    for called, source, layer, kind in (
+        ("Parcels", parcels, PARCELS, "polygon"),
+        ("Streets", streets, STREETS, "line"),
+    ):
         try:
-            found.append(read_features(source, layer=_layer_of(source, layer.name)))
+            found.append(read_features(source, layer=_layer_of(source, layer.name), kind=kind))
         except BoundaryError as error:
             problems += [f"{called}: {problem}" for problem in error.problems]
     if problems:

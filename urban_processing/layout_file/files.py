@@ -19,12 +19,20 @@ import shapely
 
 from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
-from urban_processing.layout import Layout, Step
+from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Step
 from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
+from urban_processing.mesh.places import vertices_at
 from urban_processing.metrics.tables import Table, layout_tables
 from urban_processing.paths import geopackage_problems
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
-from urban_processing.schema import INPUT_BOUNDARY, ISSUES, PARCELS, PROVENANCE, STREETS
+from urban_processing.schema import (
+    INPUT_BOUNDARY,
+    ISSUES,
+    OBSTACLES,
+    PARCELS,
+    PROVENANCE,
+    STREETS,
+)
 from urban_processing.site import FloatArray, Frame, Issue
 from urban_processing.street_rules import StreetRules
 
@@ -146,14 +154,14 @@ def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
     """Read the layout that was written."""
     source = file.path
     try:
-        parts = _read_parts(file, np.asarray(state["corners"], dtype=np.float64))
+        parts = _read_parts(file, state)
         issues = _read_issues(file)
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
         return layout.replace(
             street_rules=StreetRules.from_dict(state.get("street_rules", {})),
             corners_given=state["corners_given"],
             history=_read_history(file),
-            input_parts=_read_input(file),
+            input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
         )
     except TopologyError as error:
         raise TopologyError(
@@ -170,31 +178,56 @@ def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
 def _read_edited(file: _File, state: Mapping[str, Any], snap: float) -> Layout:
     """Read parcels and streets, whatever was done to them, and fit them together."""
     try:
-        parcels, _ = file.layer(PARCELS.name)
-        streets, _ = file.layer(STREETS.name)
+        parcels, parcel = file.layer(PARCELS.name, "locked")
+        streets, street = file.layer(STREETS.name, "fixed_id")
+        polygons, of_parcel = _single(parcels, "Polygon")
+        lines, of_street = _single(streets, "LineString")
+        locked = np.array([value is True or value == 1 for value in parcel["locked"].tolist()])
         layout = assemble_layout(
-            _single(parcels, "Polygon"),
-            _single(streets, "LineString"),
+            polygons,
+            lines,
             frame=file.frame,
             snap=snap,
             min_area=state["min_area"],
+            locked=locked[of_parcel],
+            fixed=_fixed_entries(street["fixed_id"])[of_street],
+            obstacles=_read_polygons(file, OBSTACLES.name),
         )
         note = Issue("layers_edited", "Parcels or streets of the file were edited.")
         return layout.replace(
             street_rules=StreetRules.from_dict(state.get("street_rules", {})),
             issues=(note, *layout.issues),
             history=_read_history(file),
-            input_parts=_read_input(file),
+            input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
+            fixed_streets=_given_streets(state),
+            vertex_entry=vertices_at(layout.mesh.xy, _places(state["entries"])),
         )
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise BoundaryError(f"{file.path} cannot be read: {error}") from error
 
 
-def _single(geometry: npt.NDArray[np.object_], kind: str) -> npt.NDArray[np.object_]:
-    """Valid single geometries of a kind."""
-    present = geometry[~shapely.is_missing(geometry)]
-    parts = shapely.get_parts(shapely.make_valid(shapely.force_2d(present)))
-    return np.array([p for p in parts if p.geom_type == kind and not p.is_empty], dtype=object)
+def _single(
+    geometry: npt.NDArray[np.object_], kind: str
+) -> tuple[npt.NDArray[np.object_], npt.NDArray[np.int64]]:
+    """Valid single geometries of a kind, and the row that each comes from."""
+    rows = np.flatnonzero(~shapely.is_missing(geometry))
+    valid = shapely.make_valid(shapely.force_2d(geometry[rows]))
+    parts, index = shapely.get_parts(valid, return_index=True)
+    chosen = [i for i, p in enumerate(parts) if p.geom_type == kind and not p.is_empty]
+    return parts[chosen], rows[index[chosen]]
+
+
+def _fixed_entries(fixed_id: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Entries of given streets from their numbers, which begin with 1; `NOT_FIXED` for none."""
+    known = np.nan_to_num(np.asarray(fixed_id, dtype=np.float64), nan=NOT_FIXED + 1)
+    return known.astype(np.int64) - 1
+
+
+def _given_streets(state: Mapping[str, Any]) -> tuple[GivenStreet, ...]:
+    return tuple(
+        GivenStreet(name, math.nan if width is None else width)
+        for name, width in state["fixed_streets"]
+    )
 
 
 @dataclass(frozen=True)
@@ -239,6 +272,12 @@ def _state(layout: Layout) -> str:
             "corners": layout.mesh.xy[layout.vertex_corner].tolist(),
             "corners_given": layout.corners_given,
             "street_rules": layout.street_rules.as_dict(),
+            "entries": layout.mesh.xy[layout.vertex_entry].tolist(),
+            "fixed_streets": [
+                [s.street_class, None if math.isnan(s.width) else s.width]
+                for s in layout.fixed_streets
+            ],
+            "land_uses": list(layout.land_uses),
         }
     )
 
@@ -259,12 +298,16 @@ def _read_state(path: Path) -> dict[str, Any]:
     return state
 
 
-def _read_parts(file: _File, corners: FloatArray) -> LayoutParts:
-    polygons, parcel = file.layer(PARCELS.name, "parcel_id", "part", "level", "lineage", "locked")
+def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
+    columns = "parcel_id", "part", "level", "lineage", "locked", "land_use"
+    polygons, parcel = file.layer(PARCELS.name, *columns)
     order = np.argsort(parcel["parcel_id"], kind="stable")
-    lines, street = file.layer(STREETS.name, "level")
-    segments, level = _segments(lines, street["level"])
+    lines, street = file.layer(STREETS.name, "level", "fixed_id")
+    segments, line = _segments(lines)
     lineage = [int(text, 16) for text in parcel["lineage"]]
+    uses = list(state["land_uses"])
+    uses += sorted(set(parcel["land_use"].tolist()) - set(uses))
+    use = [uses.index(name) for name in parcel["land_use"].tolist()]
     return LayoutParts(
         polygons=polygons[order],
         face_part=parcel["part"][order],
@@ -272,19 +315,27 @@ def _read_parts(file: _File, corners: FloatArray) -> LayoutParts:
         face_lineage=np.array(lineage, dtype=np.uint64)[order],
         face_locked=parcel["locked"].astype(bool)[order],
         segments=segments,
-        segment_level=level,
-        corners=corners.reshape(-1, 2),
+        segment_level=np.asarray(street["level"], dtype=np.int16)[line],
+        segment_fixed=_fixed_entries(street["fixed_id"])[line],
+        corners=_places(state["corners"]),
+        entries=_places(state["entries"]),
+        face_use=np.array(use, dtype=np.int64)[order],
+        obstacles=_read_polygons(file, OBSTACLES.name),
+        fixed_streets=_given_streets(state),
+        land_uses=tuple(uses),
     )
 
 
-def _segments(
-    lines: npt.NDArray[np.object_], level: npt.NDArray[Any]
-) -> tuple[FloatArray, npt.NDArray[np.int16]]:
-    """Split lines at their vertices: (S, 2, 2) ends and (S,) levels."""
+def _places(xy: Any) -> FloatArray:
+    return np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+
+
+def _segments(lines: npt.NDArray[np.object_]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Split lines at their vertices: (S, 2, 2) ends, and (S,) the line of each."""
     xy, line = shapely.get_coordinates(lines, return_index=True)
     same = line[1:] == line[:-1]
     segments = np.stack([xy[:-1], xy[1:]], axis=1)[same]
-    return segments, np.asarray(level, dtype=np.int16)[line[1:][same]]
+    return segments, line[1:][same]
 
 
 def _read_issues(file: _File) -> tuple[Issue, ...]:
@@ -319,8 +370,8 @@ def _read_history(file: _File) -> tuple[Step, ...]:
     )
 
 
-def _read_input(file: _File) -> tuple[shapely.Polygon, ...]:
-    name = INPUT_BOUNDARY.name
+def _read_polygons(file: _File, name: str) -> tuple[shapely.Polygon, ...]:
+    """Polygons of a layer, none where there is no such layer."""
     if name not in file.library.layer_names(file.path):
         return ()
     geometry, _ = file.layer(name, "part")

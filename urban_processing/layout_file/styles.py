@@ -22,7 +22,7 @@ _REDS = ("247,200,186,230", "238,140,116,230", "214,69,56,235")
 _STREET, _CASING = "255,204,70,255", "133,102,26,255"
 _STREETS = {
     "rim": ("Rim street", "240,158,56,255"),
-    "fixed": ("Fixed street", "150,178,200,255"),
+    "fixed": ("Given street", "150,178,200,255"),
     "collector": ("Collector", _STREET),
     "local": ("Local street", "255,232,160,255"),
     "cul_de_sac": ("Cul-de-sac", "255,253,246,255"),
@@ -204,10 +204,15 @@ def _parcels() -> list[_Rule]:
 
 
 def _streets() -> list[_Rule]:
-    return [
-        _Rule(label, f"\"class\" = '{name}'", _street(color, 0.6), "line")
-        for name, (label, color) in _STREETS.items()
-    ]
+    # given streets keep the classes of the user, whatever they are
+    given = '"fixed_id" IS '
+    label, color = _STREETS["fixed"]
+    rules = [_Rule(label, f"{given}NOT NULL", _street(color, 0.6), "line")]
+    for name, (label, color) in _STREETS.items():
+        if name != "fixed":
+            own = f"\"class\" = '{name}' AND {given}NULL"
+            rules.append(_Rule(label, own, _street(color, 0.6), "line"))
+    return rules
 
 
 def _junctions() -> list[_Rule]:
@@ -239,7 +244,7 @@ _RULES = {
     "input_boundary": lambda: [
         _Rule("Boundary as given", "", [_fill("", outline=_DARK, width=0.2, dash="dash")], "fill")
     ],
-    "obstacles": lambda: [_Rule("Obstacle", "", [_fill("199,218,201,230")], "fill")],
+    "obstacles": lambda: [_Rule("Obstacle", "", [_fill("198,216,222,230")], "fill")],
     "right_of_way": lambda: [
         _Rule("Right-of-way", "", [_fill(_SURFACE, outline=_SURFACE)], "fill")
     ],

@@ -15,6 +15,7 @@ from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.metrics.overlap import (
+    Segments,
     covered_share,
     find_overlaps,
     segments_of,
@@ -90,7 +91,11 @@ def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None
     """
     # the geometries of `parcel_table`, without its measures, which nobody asks for here
     parcels = Table(
-        {"parcel_id": np.arange(1, layout.mesh.n_faces + 1), "part": layout.face_part},
+        {
+            "parcel_id": np.arange(1, layout.mesh.n_faces + 1),
+            "part": layout.face_part,
+            "locked": layout.face_locked,
+        },
         layout.mesh.face_polygons(layout.frame.origin),
     )
     boundary = boundary_table(layout)
@@ -124,8 +129,8 @@ def certify(
 ) -> Certificate:
     """Certify a layout by its layers, as they are in a file.
 
-    Nothing but the geometries, `parcel_id` and `part` is relied on: areas, frontages and
-    connections are worked out anew.
+    Nothing but the geometries, `parcel_id` and `part` is relied on, and `locked` and `fixed_id`
+    for what the user gave: areas, frontages and connections are worked out anew.
 
     Parameters
     ----------
@@ -134,8 +139,9 @@ def certify(
     min_area
         The smallest parcel allowed, m².
     issues
-        The `issues` layer. Where it is given, a parcel smaller than `min_area`, allowed if
-        it is a whole part, must be listed there.
+        The `issues` layer. Where it is given, a parcel smaller than `min_area`, allowed if it
+        is a whole part or a block that nothing but given streets, locked land and the land's
+        boundary enclose, must be listed there; so must a part of one parcel without a street.
     right_of_way, net_parcels
         These layers, where rights-of-way are laid out.
     net_min_area
@@ -153,19 +159,22 @@ def certify(
     polygons, lines, land = _shift_to_origin(_geometry(parcels), streets, boundary)
     usable = _usable(polygons)
     land_part = np.asarray(boundary["part"], dtype=np.int64)
+    street_part = np.asarray(streets["part"], dtype=np.int64)
+    excused = _alone(part) & ~np.isin(part, street_part) & _listed(ids, issues)
     coverage = _coverage(ids[usable], polygons[usable])
     # uniting a valid coverage is faster, and only right, where its boundaries match
     unite = shapely.coverage_union_all if coverage.holds else shapely.union_all
     area = shapely.area(polygons)
     if net_min_area and net_parcels is not None:
         area = _net_areas(ids, net_parcels)
+    bounds = _bounds(parcels, streets, lines, land)
     checks = (
         _valid(ids, usable),
         coverage,
         _land_covered(polygons[usable], part[usable], land, land_part, unite),
-        *_street_checks(ids, polygons, lines, usable),
-        _connected(lines, np.asarray(streets["part"], dtype=np.int64), land_part, ids, part),
-        _large_enough(ids, part, area, min_area, issues),
+        *_street_checks(ids, polygons, lines, usable, excused),
+        _connected(lines, street_part, np.setdiff1d(land_part, part[excused]), ids, part),
+        _large_enough(ids, part, polygons, area, min_area, issues, bounds),
     )
     if right_of_way is None or net_parcels is None:
         return Certificate(checks)
@@ -279,6 +288,7 @@ def _street_checks(
     polygons: npt.NDArray[np.object_],
     lines: npt.NDArray[np.object_],
     usable: BoolArray,
+    excused: BoolArray,
 ) -> tuple[Check, Check]:
     """Frontage of each parcel, and street length that lies on no parcel's boundary."""
     outlines = polygons.copy()
@@ -290,7 +300,7 @@ def _street_checks(
     frontage = np.bincount(owner, weights=length, minlength=len(ids))
     area = np.where(usable, shapely.area(polygons), 0.0)
     # overlaps are measured to the micrometre, as coordinates are kept
-    bad = ids[~usable | (frontage < reached_frontage(area) - SNAP_M)]
+    bad = ids[~usable | ((frontage < reached_frontage(area) - SNAP_M) & ~excused)]
     off = float(((1.0 - covered_share(overlaps, len(street.line))) * street.length).sum())
     rounding = SNAP_M * (1 + len(street.line))
     return (
@@ -322,7 +332,7 @@ def _connected(
     label = connected_components(graph, directed=False)[1] if n else np.empty(0, dtype=np.int64)
     wrong = []
     most = 1
-    for p in np.unique(land_part).tolist():
+    for p in np.union1d(land_part, street_part).tolist():
         found = len(np.unique(label[node[0][street_part[segments.line] == p]]))
         if found != 1:
             wrong.append(p)
@@ -339,20 +349,53 @@ def _connected(
     )
 
 
+def _alone(part: IntArray) -> BoolArray:
+    """Which parcels are a whole part of the land each."""
+    _, inverse, count = np.unique(part, return_inverse=True, return_counts=True)
+    return np.asarray(count[inverse] == 1)
+
+
+def _listed(ids: IntArray, issues: Table | None) -> BoolArray:
+    """Which parcels the issues speak of; all where the issues are not known."""
+    if issues is None:
+        return np.ones(len(ids), dtype=bool)
+    return np.isin(ids, issues["parcel_id"])
+
+
+@dataclass(frozen=True, eq=False)
+class _Bounds:
+    """What no cut may move: (F,) locked parcels, given streets, and the land."""
+
+    locked: BoolArray
+    streets: npt.NDArray[np.object_]
+    land: npt.NDArray[np.object_]
+
+
+def _bounds(
+    parcels: Table,
+    streets: Table,
+    lines: npt.NDArray[np.object_],
+    land: npt.NDArray[np.object_],
+) -> _Bounds:
+    locked = np.asarray(parcels.columns.get("locked", np.zeros(len(parcels))), dtype=bool)
+    given = np.asarray(streets.columns.get("fixed_id", np.full(len(streets), np.nan)))
+    return _Bounds(locked, lines[~np.isnan(given)], land)
+
+
 def _large_enough(
     ids: IntArray,
     part: IntArray,
+    polygons: npt.NDArray[np.object_],
     area: FloatArray,
     min_area: float,
     issues: Table | None,
+    bounds: _Bounds,
 ) -> Check:
-    """No parcel under `min_area`, unless it is a whole part and listed as an issue."""
+    """No parcel under `min_area` but locked ones and those that nothing can make larger."""
     area = np.nan_to_num(area)
     small = area < min_area * (1.0 - AREA_ROUNDING)
-    _, inverse, count = np.unique(part, return_inverse=True, return_counts=True)
-    excused = count[inverse] == 1
-    if issues is not None:
-        excused &= np.isin(ids, issues["parcel_id"])
+    excused = _alone(part) | _enclosed(polygons, small & ~bounds.locked, bounds)
+    excused = (excused & _listed(ids, issues)) | bounds.locked
     bad = small & ~excused
     return Check(
         "min_area",
@@ -362,6 +405,29 @@ def _large_enough(
         f"{int(bad.sum())} parcels are smaller than {min_area:g} m².",
         tuple(ids[bad].tolist()),
     )
+
+
+def _enclosed(polygons: npt.NDArray[np.object_], chosen: BoolArray, bounds: _Bounds) -> BoolArray:
+    """Which chosen parcels have all of their outline on bounds, some of it on what was given."""
+    out = np.zeros(len(polygons), dtype=bool)
+    rows = np.flatnonzero(chosen)
+    if not len(rows):
+        return out
+    outline = segments_of(polygons[rows])
+    given = np.concatenate([bounds.streets, polygons[bounds.locked]])
+    on_given = _length_on(outline, given, len(rows))
+    on_any = _length_on(outline, np.concatenate([given, bounds.land]), len(rows))
+    whole = np.bincount(outline.line, weights=outline.length, minlength=len(rows))
+    rounding = SNAP_M * (1 + np.bincount(outline.line, minlength=len(rows)))
+    out[rows] = (on_any >= whole - rounding) & (on_given > rounding)
+    return out
+
+
+def _length_on(outline: Segments, lines: npt.NDArray[np.object_], n: int) -> FloatArray:
+    """(n,) length of each outline that lies on some lines."""
+    share = covered_share(find_overlaps(outline, segments_of(lines), SNAP_M), len(outline.line))
+    length = share * outline.length
+    return np.asarray(np.bincount(outline.line, weights=length, minlength=n), dtype=np.float64)
 
 
 def _check(name: str, value: float, limit: float, what: str, bad: IntArray) -> Check:

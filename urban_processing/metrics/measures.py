@@ -210,6 +210,9 @@ def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -
     mesh = layout.mesh
     street = ~net.street_rim & _in_part(net.street_part, part)
     node = net.node_interior & _in_part(net.node_part, part)
+    junction = (net.node_kind == NodeKind.JUNCTION) | (
+        (net.node_kind == NodeKind.ENTRY) & (net.node_degree > 2)
+    )
     here = node[net.pair_node]
     deviation = net.pair_deviation[here & (net.pair_rim < 2)]
     deviation_interior = net.pair_deviation[here & (net.pair_rim == 0)]
@@ -221,7 +224,7 @@ def _street_values(known: LayoutMeasures, part: int | None, inside: BoolArray) -
     side = math.sqrt(float(mesh.face_area[inside].mean()))
     return {
         "streets": n_streets,
-        "junctions": int((node & (net.node_kind == NodeKind.JUNCTION)).sum()),
+        "junctions": int((node & junction).sum()),
         "street_ends": int((node & (net.node_kind == NodeKind.END)).sum()),
         "street_length_m": length,
         "street_length_mean_m": length / n_streets if n_streets else math.nan,

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.layout import Layout
+from urban_processing.layout import ON_OBSTACLE, EdgeKind, Layout
 from urban_processing.mesh.planar import OUTSIDE, FloatArray
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
 from urban_processing.rights_of_way import RightsOfWay
@@ -20,10 +20,7 @@ from urban_processing.rights_of_way.lay_out import CLASSES
 from urban_processing.schema import ColumnType, layer
 from urban_processing.streets.network import NodeKind
 
-PARCEL_USE = "parcel"
-"""Land use of a parcel that nobody gave another use."""
-
-NODE_KIND_NAMES = {NodeKind.JUNCTION: "junction", NodeKind.END: "end"}
+NODE_KIND_NAMES = {NodeKind.JUNCTION: "junction", NodeKind.END: "end", NodeKind.ENTRY: "entry"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +54,8 @@ class Table:
 def layout_tables(layout: Layout, *, measures: LayoutMeasures | None = None) -> dict[str, Table]:
     """Return all layers of the schema that a layout has, in the order of the schema.
 
-    `input_boundary` is left out where the polygons as given are not known, `right_of_way` and
-    `net_parcels` where no rights-of-way are laid out.
+    `input_boundary` is left out where the polygons as given are not known, `obstacles` where
+    there are none, `right_of_way` and `net_parcels` where no rights-of-way are laid out.
     """
     known = LayoutMeasures(layout) if measures is None else measures
     tables = {
@@ -69,6 +66,8 @@ def layout_tables(layout: Layout, *, measures: LayoutMeasures | None = None) -> 
     }
     if layout.input_parts:
         tables["input_boundary"] = input_boundary_table(layout)
+    if layout.obstacles:
+        tables["obstacles"] = obstacle_table(layout)
     if known.rights_of_way is not None:
         tables["right_of_way"] = right_of_way_table(layout, known.rights_of_way)
         tables["net_parcels"] = net_parcel_table(layout, known.rights_of_way)
@@ -99,7 +98,7 @@ def parcel_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
             "depth_m": p.depth,
             "thinness": p.thinness,
             "rim": p.rim,
-            "land_use": [PARCEL_USE] * n,
+            "land_use": [layout.land_uses[i] for i in layout.face_use.tolist()],
             "locked": layout.face_locked,
             "reached": p.reached,
             "through_lot": p.through,
@@ -127,6 +126,7 @@ def street_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
             "length_m": net.edge_length,
             "from_junction": number[net.start],
             "to_junction": number[net.end],
+            "fixed_id": np.where(net.edge_fixed >= 0, net.edge_fixed + 1.0, np.nan),
         },
         net.lines(layout.mesh, layout.frame.origin),
     )
@@ -207,6 +207,21 @@ def net_parcel_table(layout: Layout, streets: RightsOfWay) -> Table:
         },
         _shifted(streets.net[face], layout),
     )
+
+
+def obstacle_table(layout: Layout) -> Table:
+    """Return what obstacles take of the land as given; `part` is the first that each bounds."""
+    mesh = layout.mesh
+    at = np.flatnonzero(layout.edge_kind == EdgeKind.OBSTACLE)
+    part = layout.face_part[mesh.face.reshape(-1, 2)[at].max(axis=1)]
+    middle = shapely.points(mesh.xy[mesh.origin.reshape(-1, 2)[at]].mean(axis=1))
+    obstacle, edge = shapely.STRtree(middle).query(
+        np.asarray(layout.obstacles, dtype=object), predicate="dwithin", distance=ON_OBSTACLE
+    )
+    last = len(np.unique(layout.face_part)) - 1
+    lowest = np.full(len(layout.obstacles), last)
+    np.minimum.at(lowest, obstacle, part[edge])
+    return _area_table("obstacles", lowest, _shifted(layout.obstacles, layout))
 
 
 def issue_table(layout: Layout) -> Table:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urban_processing.layout import Layout
+from urban_processing.layout import NOT_FIXED, Layout
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import GRID
 
@@ -49,7 +49,7 @@ class Motion:
 def free_motion(layout: Layout) -> Motion:
     """Free inside the land, sliding on straight runs of the rim, fixed elsewhere.
 
-    Vertices of locked parcels, and of parcels around a hole, stay.
+    Vertices of locked parcels, of given streets, and of parcels around a hole, stay.
     """
     mesh = layout.mesh
     free = ~mesh.vertex_is_boundary
@@ -57,6 +57,7 @@ def free_motion(layout: Layout) -> Motion:
     stays = layout.face_locked | (mesh.face_n_loops > 1)
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[mesh.origin[(mesh.face != OUTSIDE) & stays[mesh.face]]] = True
+    held[mesh.origin[np.repeat(layout.edge_fixed != NOT_FIXED, 2)]] = True
     free &= ~held
     slides = (slide != 0).any(axis=1) & ~held
     unknown = np.full((mesh.n_vertices, 2), STAYS)
@@ -110,6 +111,7 @@ def _anchored(layout: Layout, vertex: IntArray, before: IntArray, after: IntArra
     )
     return np.asarray(
         layout.vertex_corner[vertex]
+        | layout.vertex_entry[vertex]
         | (visits[vertex] > 1)
         | (mesh.valence[vertex] < 3)
         | ~alike

@@ -8,7 +8,7 @@ import enum
 import math
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -75,6 +75,19 @@ class Params:
         del called
         return []
 
+    def contradictions_with(self, layers: Collection[str], called: Naming) -> list[str]:
+        """Return one sentence for each contradiction between values and the layers given.
+
+        Parameters
+        ----------
+        layers
+            Names of the optional inputs that were given.
+        called
+            Gives the name of a parameter or an input as the user knows it.
+        """
+        del layers, called
+        return []
+
     @classmethod
     def fields(cls) -> tuple[ParamField, ...]:
         """Return the declared parameters in order."""
@@ -82,7 +95,7 @@ class Params:
         return tuple(_field(f.name, hints[f.name], f.default) for f in dataclasses.fields(cls))
 
     @classmethod
-    def from_values(cls, values: Mapping[str, Any]) -> Self:
+    def from_values(cls, values: Mapping[str, Any], layers: Collection[str] = ()) -> Self:
         """Create an instance from values by name; unknown names are mistakes like others.
 
         Raises
@@ -90,13 +103,18 @@ class Params:
         ParameterError
             With one sentence for each mistake.
         """
-        problems = cls.problems_with(values)
+        problems = cls.problems_with(values, layers=layers)
         if problems:
             raise ParameterError(problems)
         return cls(**values)
 
     @classmethod
-    def problems_with(cls, values: Mapping[str, Any], called: Naming | None = None) -> list[str]:
+    def problems_with(
+        cls,
+        values: Mapping[str, Any],
+        called: Naming | None = None,
+        layers: Collection[str] = (),
+    ) -> list[str]:
         """Return the sentences that creating an instance from `values` would raise.
 
         Parameters
@@ -105,14 +123,17 @@ class Params:
             Values by name.
         called
             Gives the name of a parameter as the user knows it; by default `option_name`.
+        layers
+            Names of the optional inputs that were given.
         """
+        named = called or option_name
         fields = cls.fields()
         known = {field.name for field in fields}
         unknown = [_unknown(name, known) for name in values if name not in known]
         draft = object.__new__(cls)
         for field in fields:
             object.__setattr__(draft, field.name, values.get(field.name, field.default))
-        return [*unknown, *draft._convert(called or option_name)]
+        return [*unknown, *draft._convert(named), *draft.contradictions_with(layers, named)]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values as plain JSON types."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -17,6 +18,22 @@ class StreetPattern(enum.StrEnum):
     LOOP = "loop"
     CUL_DE_SAC = "cul-de-sac"
     TREE = "tree"
+
+
+class RimStreet(enum.StrEnum):
+    """Which part of the land's rim is street (Chen 2024, Fig. 14)."""
+
+    STREET = "street"
+    NONE = "none"
+    ALONG_LINES = "along-lines"
+    EXCEPT_LINES = "except-lines"
+
+
+class ObstacleRim(enum.StrEnum):
+    """Whether there is a street around obstacles."""
+
+    NONE = "none"
+    STREET = "street"
 
 
 class Preset(enum.StrEnum):
@@ -166,6 +183,30 @@ class CogenerateParams(Params):
             "regular in the end.",
         ),
     ] = True
+    rim: Annotated[
+        RimStreet | None,
+        Param(
+            label="Streets on the rim",
+            help="Which part of the rim of the land is street: all of it (the default), none, or, "
+            "where rim lines are given, that along the lines (then the default) or all but that.",
+            group=_STREETS,
+            labels={
+                "street": "All of the rim",
+                "none": "None of it",
+                "along-lines": "Along the rim lines",
+                "except-lines": "All but along the rim lines",
+            },
+        ),
+    ] = None
+    obstacle_rim: Annotated[
+        ObstacleRim,
+        Param(
+            label="Rims of obstacles",
+            help="Whether a street runs around obstacles, such as along a lakeside.",
+            group=_STREETS,
+            labels={"none": "No street", "street": "Street"},
+        ),
+    ] = ObstacleRim.NONE
     seed: Annotated[
         int,
         Param(
@@ -357,6 +398,19 @@ class CogenerateParams(Params):
         ),
     ] = 3
 
+    snap_tolerance: Annotated[
+        float,
+        Param(
+            label="Tolerance of given lines",
+            help="Ends of given streets join the rim and each other within this distance; what "
+            "is closer together is taken for one line.",
+            unit="m",
+            above=0,
+            advanced=True,
+            group=_STREETS,
+        ),
+    ] = 1.0
+
     def contradictions(self, called: Naming) -> list[str]:
         """Return what contradicts: sizes, weights, dimensions, a net area without street."""
         problems = []
@@ -389,6 +443,26 @@ class CogenerateParams(Params):
             basis, streets = called("min_area_basis"), called("right_of_way")
             problems.append(
                 f"{basis} net needs {streets}: without right-of-way there is no net area."
+            )
+        return problems
+
+    def contradictions_with(self, layers: Collection[str], called: Naming) -> list[str]:
+        """Return what contradicts the layers given: rims of what is not there, or twice said."""
+        problems = []
+        rim, lines = called("rim"), called("rim_lines")
+        if "rim_lines" in layers and self.rim in (RimStreet.STREET, RimStreet.NONE):
+            problems.append(
+                f"{rim} {self.rim.value} speaks of the whole rim, {lines} of a part of it: give "
+                f"one of the two, or {rim} along-lines or except-lines."
+            )
+        if "rim_lines" not in layers and self.rim in (
+            RimStreet.ALONG_LINES,
+            RimStreet.EXCEPT_LINES,
+        ):
+            problems.append(f"{rim} {self.rim.value} needs {lines}: give lines along the rim.")
+        if "obstacles" not in layers and self.obstacle_rim is ObstacleRim.STREET:
+            problems.append(
+                f"{called('obstacle_rim')} street needs {called('obstacles')}: there is no rim."
             )
         return problems
 

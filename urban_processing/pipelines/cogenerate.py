@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.errors import InfeasibleError
-from urban_processing.land import default_tolerance, first_layout, simplify_site
+from urban_processing.land import default_tolerance
 from urban_processing.layout import Layout, Step
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.optimization.optimize import optimize_geometry
@@ -18,16 +18,19 @@ from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines.dimensions import check_dimensions, missed_dimensions
 from urban_processing.pipelines.findings import findings
+from urban_processing.pipelines.ground import land_area, lay_ground, refuse_islands
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas
 from urban_processing.site import Site
+from urban_processing.streets.entries import choose_entries, join_along_rims
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 from urban_processing.streets.shorten import divide_long_blocks
 from urban_processing.subdivision.cuts import AREA_ROUNDING
+from urban_processing.subdivision.first_cuts import tie_together
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level
 from urban_processing.subdivision.recut import recut_irregular
@@ -170,7 +173,7 @@ def smallest_area(site: Site, params: CogenerateParams) -> float:
     if params.min_area is not None:
         rules = params.street_rules
         return gross_floor(params.min_area, rules) if rules.net_min_area else params.min_area
-    return FLOOR_SHARE * site.area / (params.parcels or 1)
+    return FLOOR_SHARE * land_area(site) / (params.parcels or 1)
 
 
 def begin(site: Site, params: CogenerateParams) -> State:
@@ -179,12 +182,18 @@ def begin(site: Site, params: CogenerateParams) -> State:
     check_dimensions(params, min_area=min_area)
     tolerance = params.simplify
     if tolerance is None:
-        mean = site.area / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
+        mean = land_area(site) / params.parcels if params.parcels else MEAN_OVER_MIN * min_area
         tolerance = default_tolerance(mean / MEAN_OVER_MIN)
-    layout = first_layout(simplify_site(site, tolerance), min_area=min_area)
+    layout = lay_ground(site, params, min_area=min_area, tolerance=tolerance)
     layout = layout.replace(street_rules=params.street_rules)
-    quota = None if params.parcels is None else shared_out(layout.mesh.face_area, params.parcels)
+    quota = None
+    if params.parcels is not None:
+        quota = shared_out(np.where(layout.face_locked, 0.0, layout.mesh.face_area), params.parcels)
     layout, parent = cut_through_holes(layout, min_area=min_area)
+    if quota is not None:
+        quota = divided(quota, parent, layout.mesh.face_area)
+    refuse_islands(layout, min_area=min_area)
+    layout, parent = tie_together(layout, min_area=min_area, params=params)
     if quota is not None:
         quota = divided(quota, parent, layout.mesh.face_area)
     state = State(
@@ -264,6 +273,7 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
         )
     progress.update(RECUT_SHARE, "Cleaning up the streets")
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
+    layout = join_along_rims(layout, params)
     layout = layout.replace(min_area=_promised_area(state, layout))
     results: dict[str, float] = {}
     if params.optimize:
@@ -277,6 +287,7 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
         # what has moved may have become a little longer than wanted
         layout = divide_long_blocks(layout, params)
     layout = _with_net_floor(canonical(layout), params)
+    layout = choose_entries(layout, params)
     missed = (*findings(layout, params), *missed_dimensions(layout, params))
     return layout.replace(issues=(*layout.issues, *missed)), results
 
@@ -285,7 +296,7 @@ def _promised_area(state: State, layout: Layout) -> float:
     """Smallest gross area in m² that the layout promises: given, or that of its smallest parcel."""
     if state.quota is None:
         return state.min_area
-    whole = layout.mesh.face_area >= state.min_area
+    whole = (layout.mesh.face_area >= state.min_area) & ~layout.face_locked
     return float(layout.mesh.face_area[whole].min()) if whole.any() else state.min_area
 
 
@@ -300,7 +311,7 @@ def _with_net_floor(layout: Layout, params: CogenerateParams) -> Layout:
     layout = canonical(keep_net_areas(layout, floor))
     if params.min_area is None:
         net = _net_areas(layout)
-        floor = float(net.min(initial=np.inf, where=net >= floor))
+        floor = float(net.min(initial=np.inf, where=(net >= floor) & ~layout.face_locked))
     return layout.replace(min_area=floor if math.isfinite(floor) else layout.min_area)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 
 from urban_processing.access_rule import reached_frontage, unreached_parcels_of
-from urban_processing.layout import EdgeKind, Layout
-from urban_processing.mesh.planar import FloatArray
+from urban_processing.layout import NOT_FIXED, EdgeKind, Layout
+from urban_processing.mesh.planar import BoolArray, FloatArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.partition import SWALLOWED_SHARE
@@ -85,43 +85,51 @@ def parcel_issues(
 
 
 def _sizes(layout: Layout) -> list[Issue]:
-    """Parts too small for a parcel, and parcels that stayed very large."""
+    """Parts and blocks too small for a parcel, and parcels that stayed very large."""
     area, which = layout.mesh.face_area, ""
+    code, why = (
+        "block_below_min_area",
+        "given streets, locked land and the rim enclose it, and it stays one parcel.",
+    )
     if layout.street_rules.net_min_area:
         area, which = lay_out_rights_of_way(layout).net_area, " net"
+        code, why = (
+            "parcel_below_min_area",
+            "it cannot be joined with another without cutting off a street.",
+        )
     least = np.full(len(area), layout.min_area)
     most = VERY_LARGE * least
-    small = area < least * (1.0 - AREA_ROUNDING)
-    alone = np.bincount(layout.face_part)[layout.face_part] == 1
-    return (
-        parcel_issues(
+    small = (area < least * (1.0 - AREA_ROUNDING)) & ~layout.face_locked
+    whole = _whole_parts(layout)
+    return [
+        *parcel_issues(
             layout,
             "part_below_min_area",
             f"This part of the land ({{value:.0f}} m²{which}) is smaller than the smallest parcel "
             "allowed ({limit:.0f} m²) and stays one parcel.",
-            small & alone,
+            small & whole,
             area,
             least,
-        )
-        + parcel_issues(
+        ),
+        *parcel_issues(
             layout,
-            "parcel_below_min_area",
+            code,
             f"This parcel ({{value:.0f}} m²{which}) is smaller than the smallest allowed "
-            "({limit:.0f} m²): it cannot be joined with another without cutting off a street.",
-            small & ~alone,
+            f"({{limit:.0f}} m²): {why}",
+            small & ~whole,
             area,
             least,
-        )
-        + parcel_issues(
+        ),
+        *parcel_issues(
             layout,
             "parcel_not_cut",
             f"No cut of this parcel ({{value:.0f}} m²{which}) leaves two simple halves that are "
             "large enough; it is larger than {limit:.0f} m².",
-            area > most,
+            (area > most) & ~layout.face_locked,
             area,
             most,
-        )
-    )
+        ),
+    ]
 
 
 def right_of_way_findings(layout: Layout) -> list[Issue]:
@@ -149,35 +157,64 @@ def right_of_way_findings(layout: Layout) -> list[Issue]:
     )
 
 
+def _whole_parts(layout: Layout) -> BoolArray:
+    """(F,) parcels that are a part of the land each."""
+    return np.asarray(np.bincount(layout.face_part)[layout.face_part] == 1)
+
+
 def _unreached(layout: Layout) -> list[Issue]:
     """Parcels with too little frontage, which happens where the rim is no street."""
     needed = reached_frontage(layout.mesh.face_area)
     unreached = np.zeros(len(needed), dtype=bool)
     unreached[unreached_parcels_of(layout)] = True
-    return parcel_issues(
-        layout,
-        "parcel_not_reached",
-        "No street can reach this parcel without running along a rim that is no street: its "
-        "frontage is {value:.1f} m, {limit:.1f} m are needed.",
-        unreached,
-        layout.frontage,
-        needed,
-    )
+    whole = _whole_parts(layout)
+    return [
+        *parcel_issues(
+            layout,
+            "part_not_reached",
+            "This part of the land is one parcel and its rim is no street: no street reaches it.",
+            unreached & whole,
+            layout.frontage,
+            needed,
+        ),
+        *parcel_issues(
+            layout,
+            "parcel_not_reached",
+            "No street can reach this parcel without running along a rim that is no street: its "
+            "frontage is {value:.1f} m, {limit:.1f} m are needed.",
+            unreached & ~whole,
+            layout.frontage,
+            needed,
+        ),
+    ]
 
 
 def _ends(layout: Layout) -> list[Issue]:
-    """Dead ends of the loop pattern, which happen where the rim is no street, or at holes."""
+    """Dead ends of the loop pattern: where the rim is no street, at holes, of given streets."""
     mesh = layout.mesh
     at = mesh.origin[np.repeat(layout.edge_street, 2)]
-    ends = np.flatnonzero(np.bincount(at, minlength=mesh.n_vertices) == 1)
-    at_hole = np.zeros(mesh.n_vertices, dtype=bool)
-    at_hole[mesh.origin[np.repeat(layout.edge_kind == EdgeKind.HOLE, 2)]] = True
+    ends = (np.bincount(at, minlength=mesh.n_vertices) == 1) & ~layout.vertex_entry
+    given = _at_vertices(layout, layout.edge_fixed != NOT_FIXED)
+    at_hole = _at_vertices(
+        layout, (layout.edge_kind == EdgeKind.HOLE) | (layout.edge_kind == EdgeKind.OBSTACLE)
+    )
+    reasons = np.select(
+        [given, at_hole],
+        ["is that of a given street and stays.", "could not be led on past the hole or obstacle."],
+        "could not be led on without a street on the rim.",
+    )
     return [
         Issue(
-            code="dead_end",
-            message="This street end could not be led on"
-            + (" past the hole." if at_hole[v] else " without a street on the rim."),
+            code="fixed_dead_end" if given[v] else "dead_end",
+            message=f"This street end {reasons[v]}",
             geometry=shapely.Point(mesh.xy[v]),
         )
-        for v in ends.tolist()
+        for v in np.flatnonzero(ends).tolist()
     ]
+
+
+def _at_vertices(layout: Layout, edges: BoolArray) -> BoolArray:
+    """(V,) vertices of some edges."""
+    out = np.zeros(layout.mesh.n_vertices, dtype=bool)
+    out[layout.mesh.origin[np.repeat(edges, 2)]] = True
+    return out

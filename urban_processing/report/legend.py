@@ -16,8 +16,11 @@ from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.metrics.tables import Table
 from urban_processing.report.palette import (
     FAINT,
+    FIXED_CASING,
+    FIXED_STREET,
     INK,
     IRREGULAR_RAMP,
+    OBSTACLE,
     PARCEL,
     SURFACE,
     TRIANGLE,
@@ -101,6 +104,19 @@ def legend_entries(
         entries.append(_swatch(SURFACE, "Right-of-way"))
     cased = [withStroke(linewidth=4.4, foreground=casing), Normal()]
     entries.append(Line2D([], [], color=street, lw=3, label="Street", path_effects=cased))
+    given = ~np.isnan(tables["streets"]["fixed_id"])
+    if given.any() and colour_by is None:
+        lined = [withStroke(linewidth=4.4, foreground=FIXED_CASING), Normal()]
+        entries.append(
+            Line2D([], [], color=FIXED_STREET, lw=3, label="Given street", path_effects=lined)
+        )
+    if "obstacles" in tables:
+        entries.append(_swatch(OBSTACLE, "Obstacle"))
+    n_entries = int((tables["junctions"]["kind"] == "entry").sum())
+    if n_entries:
+        mark = Line2D([], [], color="white", marker="^", markeredgecolor=INK, ls="", ms=6)
+        mark.set_label(f"{n_entries:,} {'entry' if n_entries == 1 else 'entries'}")
+        entries.append(mark)
     if n_ends:
         dot = Line2D([], [], color=street, marker="o", markeredgecolor=casing, ls="", ms=5)
         dot.set_label(_counted(n_ends, "street end"))

@@ -31,7 +31,10 @@ from urban_processing.report.legend import (
 from urban_processing.report.palette import (
     CASING,
     FAINT,
+    FIXED_CASING,
+    FIXED_STREET,
     INK,
+    OBSTACLE,
     OUTLINE,
     PLAIN_CASING,
     PLAIN_STREET,
@@ -197,6 +200,8 @@ def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
     _draw_parcels(ax, tables["parcels"], scale, colour_by)
     if "right_of_way" in tables:
         _draw_right_of_way(ax, tables["right_of_way"])
+    if "obstacles" in tables:
+        _draw_obstacles(ax, tables["obstacles"])
     _draw_rim(ax, tables["boundary"], scale)
     colours = (STREET, CASING) if colour_by is None else (PLAIN_STREET, PLAIN_CASING)
     _draw_streets(ax, tables["streets"], tables["junctions"], scale, colours)
@@ -295,12 +300,15 @@ def _draw_streets(
         return
     width = scale.street(streets["width_m"])
     ends = shapely.get_coordinates(_geometry(junctions)[junctions["kind"] == "end"])
-    fill, casing = colours
-    for colour, margin, zorder in ((casing, 2 * scale.casing, 2), (fill, 0.0, 3)):
+    entries = shapely.get_coordinates(_geometry(junctions)[junctions["kind"] == "entry"])
+    given = ~np.isnan(streets["fixed_id"])
+    for fill, margin, zorder in ((False, 2 * scale.casing, 2), (True, 0.0, 3)):
+        colour = colours[0 if fill else 1]
+        fixed = (FIXED_STREET if fill else FIXED_CASING) if colours[0] == STREET else colour
         ax.add_collection(
             LineCollection(
                 lines,
-                colors=colour,
+                colors=[fixed if is_given else colour for is_given in given.tolist()],
                 linewidths=width + margin,
                 capstyle="round",
                 joinstyle="round",
@@ -309,6 +317,29 @@ def _draw_streets(
         )
         size = 2.0 * float(np.median(width)) + margin
         ax.scatter(ends[:, 0], ends[:, 1], s=size**2, c=colour, linewidths=0, zorder=zorder)
+    size = 2.2 * float(np.median(width)) + 2 * scale.casing
+    ax.scatter(
+        entries[:, 0],
+        entries[:, 1],
+        s=size**2,
+        c="white",
+        edgecolors=INK,
+        linewidths=2 * scale.casing,
+        marker="^",
+        zorder=4,
+        clip_on=False,
+    )
+
+
+def _draw_obstacles(ax: Axes, obstacles: Table) -> None:
+    ax.add_collection(
+        PathCollection(
+            [_outline(polygon) for polygon in _polygons(obstacles)],
+            facecolors=OBSTACLE,
+            edgecolors="none",
+            zorder=0.5,
+        )
+    )
 
 
 def _geometry(table: Table) -> npt.NDArray[np.object_]:

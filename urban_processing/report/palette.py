@@ -25,6 +25,8 @@ VALUE_RAMP = LinearSegmentedColormap.from_list(
     "value", ["#f7f3dc", "#b9dcc0", "#63b3bd", "#2f7aa8", "#2b4a86"]
 )
 STREET, CASING = "#ffcc46", "#8a6b1f"
+FIXED_STREET, FIXED_CASING = "#9dbad2", "#4c6a84"
+OBSTACLE = "#d3e0e4"
 PLAIN_STREET, PLAIN_CASING = "#ffffff", "#8c8579"
 
 

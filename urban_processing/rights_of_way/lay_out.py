@@ -137,4 +137,6 @@ def _turning_heads(layout: Layout, network: StreetNetwork) -> Circles:
 
 def _ranks(network: StreetNetwork) -> IntArray:
     rank = {each.value: i for i, each in enumerate(CLASSES)}
-    return np.array([rank[c] for c in network.edge_class.tolist()], dtype=np.int64)
+    given = rank[StreetClass.FIXED]
+    # classes that the user gave streets are of any name
+    return np.array([rank.get(c, given) for c in network.edge_class.tolist()], dtype=np.int64)

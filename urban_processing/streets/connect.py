@@ -107,23 +107,40 @@ def path_to_network(
 
 
 def join_components(state: StreetState) -> None:
-    """Connect the street components of each part, as far as there is a way."""
+    """Connect the street components of each part, as far as there is a way.
+
+    The smallest is joined first, so that each way is as short as can be.
+    """
+    stuck: set[int] = set()
+    while True:
+        loose = _loose_components(state)
+        nodes = next((c for c in loose if c[0] not in stuck), None)
+        if nodes is None:
+            return
+        if not _join(state, nodes):
+            stuck.add(nodes[0])
+
+
+def _loose_components(state: StreetState) -> list[list[int]]:
+    """Nodes of all street components but the largest of each part, the smallest first."""
     n_components, label = state.network_components()
-    parts: dict[int, int] = {}
-    for node in np.flatnonzero(label >= 0).tolist():
-        parts.setdefault(int(label[node]), state.part_of(state.out[node][0]))
-    if n_components == len(set(parts.values())):
-        return
-    members = np.bincount(label[label >= 0], minlength=n_components)
-    largest: dict[int, int] = {}
-    for component in np.argsort(-members, kind="stable").tolist():
-        largest.setdefault(parts[component], component)
-    for component in np.argsort(members, kind="stable").tolist():
-        if component != largest[parts[component]]:
-            _join(state, np.flatnonzero(label == component).tolist())
+    used = np.flatnonzero(label >= 0)
+    _, first = np.unique(label[used], return_index=True)
+    part = [state.part_of(state.out[used[i]][0]) for i in first.tolist()]
+    if n_components == len(set(part)):
+        return []
+    members = np.bincount(label[used], minlength=n_components)
+    order = np.argsort(members, kind="stable").tolist()
+    largest = {part[component]: component for component in order}
+    return [
+        np.flatnonzero(label == component).tolist()
+        for component in order
+        if component != largest[part[component]]
+    ]
 
 
-def _join(state: StreetState, nodes: list[int]) -> None:
+def _join(state: StreetState, nodes: list[int]) -> bool:
+    """Lead a component to another one; whether there is a way."""
     own = set(nodes)
     starts = []
     for v in nodes:
@@ -134,6 +151,19 @@ def _join(state: StreetState, nodes: list[int]) -> None:
             for i in state.out[v]
             if state.usable[i] and not state.street[i]
         ]
-    for _, path in find_paths(state, starts, own):
+    paths = find_paths(state, starts, own)
+    for _, path in paths:
         for i in path:
             state.add(i)
+    return bool(paths)
+
+
+def join_entries(state: StreetState) -> None:
+    """Lead a street from each entry to the network of its part, as far as there is a way."""
+    for node, is_entry in enumerate(state.entry):
+        if not is_entry or state.degree[node]:
+            continue
+        starts = [(0.0, i) for i in state.out[node] if state.usable[i]]
+        for _, path in find_paths(state, starts, {node}):
+            for i in path:
+                state.add(i)

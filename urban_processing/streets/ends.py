@@ -67,8 +67,12 @@ def close_end(
 
 
 def dead_ends(state: StreetState) -> list[int]:
-    """Nodes with a single street."""
-    return [v for v, d in enumerate(state.degree) if d == 1]
+    """Nodes with a single street, without entries and the ends of streets that the user gave."""
+    return [
+        v
+        for v, d in enumerate(state.degree)
+        if d == 1 and not state.entry[v] and not state.fixed[street_into(state, v)]
+    ]
 
 
 def close_ends(state: StreetState) -> None:
@@ -94,9 +98,9 @@ def retract_ends(state: StreetState) -> None:
 def retract_end(state: StreetState, node: int) -> list[int]:
     """Take back one dead end as far as `retract_ends` does; return its chains."""
     removed = []
-    while state.degree[node] == 1:
+    while state.degree[node] == 1 and not state.entry[node]:
         chain = street_into(state, node)
-        if not state.interior[chain] or not state.part_has_street_rim[state.part_of(chain)]:
+        if not state.removable[chain] or not state.part_has_street_rim[state.part_of(chain)]:
             break
         state.remove(chain)
         removed.append(chain)
@@ -109,10 +113,10 @@ def prune_tails(state: StreetState) -> None:
     open_ = dead_ends(state)
     while open_:
         node = open_.pop()
-        if state.degree[node] != 1:
+        if state.degree[node] != 1 or state.entry[node]:
             continue
         chain = street_into(state, node)
-        if state.interior[chain] and is_spare(state, [chain]):
+        if state.removable[chain] and is_spare(state, [chain]):
             state.remove(chain)
             open_.append(state.start[chain])
 

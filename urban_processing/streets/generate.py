@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams
-from urban_processing.streets.connect import join_components
+from urban_processing.streets.connect import join_components, join_entries
 from urban_processing.streets.ends import close_ends, prune_tails, retract_ends
 from urban_processing.streets.groups import group_parcels, unreached_parcels
 from urban_processing.streets.reach import reach_group
@@ -59,6 +59,7 @@ def extend_streets(
         distance = state.network_distance()
         for group in group_parcels(state, unreached):
             reach_group(state, group, distance, keep_ends=keep_ends)
+    join_entries(state)
     prune_tails(state)
     join_components(state)
     if not keep_ends:

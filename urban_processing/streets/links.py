@@ -23,7 +23,8 @@ def street_links(state: StreetState) -> list[list[int]]:
         if (
             degree[end[link[-1]]] >= 3
             and first < link[-1] ^ 1
-            and all(state.interior[i] for i in link)
+            and all(state.removable[i] for i in link)
+            and not any(state.entry[end[i]] for i in link[:-1])
         ):
             links.append(link)
     return links

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +14,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from urban_processing.layout import EdgeKind, Layout
+from urban_processing.layout import EdgeKind, GivenStreet, Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh, rank_cycles
 from urban_processing.mesh.straight import (
     STRAIGHT_DEG,
@@ -35,6 +37,8 @@ class NodeKind(enum.IntEnum):
     """The arbitrary start of a ring that no other street meets."""
     END = 1
     JUNCTION = 2
+    ENTRY = 3
+    """Where the network meets the outside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +66,12 @@ class StreetNetwork:
     """The street edges of a layout as K network edges, N nodes and S streets.
 
     A network edge is a chain of street edges between nodes. Nodes are the vertices where
-    other than two street edges meet, where the rim meets an interior street, and where an
-    interior street bends by an included angle of at most `STRAIGHT_DEG`. Rim streets are
-    those on the outer ring of the land; they bend as the land does and are divided only where
-    an interior street meets them. All numbering and all directions follow from coordinates
-    alone, so that they do not depend on the order of mesh edges.
+    other than two street edges meet, where the rim meets an interior street, where a street
+    that the user gave begins or ends, at entries, and where an interior street bends by an
+    included angle of at most `STRAIGHT_DEG`. Rim streets are those on the outer ring of the
+    land; they bend as the land does and are divided only where an interior street meets them.
+    All numbering and all directions follow from coordinates alone, so that they do not depend
+    on the order of mesh edges.
 
     Parameters
     ----------
@@ -76,14 +81,17 @@ class StreetNetwork:
         (K,) nodes; the same node for a ring.
     edge_rim
         (K,) whether a network edge lies on the outer ring of the land.
+    edge_fixed
+        (K,) the given street that a network edge lies on, -1 for none.
     edge_part, edge_level, edge_length
         (K,) part of the land, lowest level of its mesh edges, length in metres.
     edge_class
-        (K,) `StreetClass`: a *cul-de-sac* leads to nothing but a street end; a *collector* is
+        (K,) `StreetClass`, or the class that the user gave a street: a *cul-de-sac* leads to
+        nothing but a street end; a *collector* is
         another interior edge of the first half (rounded up) of the levels that have interior
-        streets; the other interior edges are *local*.
+        streets; the other interior edges are *local*. A given street without a class is *fixed*.
     edge_width
-        (K,) nominal width of the right-of-way in metres, that of the class.
+        (K,) width of the right-of-way in metres: the user's, else the nominal one of the class.
     edge_street
         (K,) street that a network edge belongs to. At a node the straightest pair of edges
         continues as one street, then the straightest of the rest, while the included angle
@@ -107,6 +115,7 @@ class StreetNetwork:
     start: IntArray
     end: IntArray
     edge_rim: BoolArray
+    edge_fixed: IntArray
     edge_part: IntArray
     edge_level: IntArray
     edge_length: FloatArray
@@ -210,21 +219,27 @@ def street_network(layout: Layout) -> StreetNetwork:
     mesh = layout.mesh
     rim = np.asarray(layout.edge_kind == EdgeKind.RIM)
     part = layout.face_part[mesh.face.reshape(-1, 2).max(axis=1)]
-    half_edges, offsets = _network_edges(mesh, layout.edge_street, rim, part)
+    sort = rim + 2 * (layout.edge_fixed + 1)
+    half_edges, offsets = _network_edges(
+        mesh, layout.edge_street, sort, rim, layout.vertex_entry, part
+    )
     first, last = half_edges[offsets[:-1]], half_edges[offsets[1:] - 1]
     ends = np.concatenate([mesh.origin[first], mesh.target[last]])
     node_vertex, ends = _number_nodes(mesh, ends, np.tile(part[first >> 1], 2))
     n_edges = len(first)
     start, end = ends[:n_edges], ends[n_edges:]
     degree = np.bincount(ends, minlength=len(node_vertex))
-    edge_rim = rim[first >> 1]
+    edge_rim, edge_fixed = rim[first >> 1], layout.edge_fixed[first >> 1]
     kind = np.where(degree == 1, NodeKind.END, NodeKind.JUNCTION)
     node_part = np.zeros(len(node_vertex), dtype=np.int64)
     node_part[ends] = np.tile(part[first >> 1], 2)
     alone = (start == end) & (degree[start] == 2) & _is_smooth(mesh, first, last, edge_rim)
     kind[start[alone]] = NodeKind.POINT
+    kind[layout.vertex_entry[node_vertex]] = NodeKind.ENTRY
     level = np.asarray(layout.edge_level[half_edges >> 1], dtype=np.int64)
     edge_level = np.minimum.reduceat(level, offsets[:-1]) if n_edges else level
+    classes = _classes(start, end, kind, degree, edge_rim, edge_level, edge_fixed >= 0)
+    classes = _given_classes(classes, layout.fixed_streets, edge_fixed)
     pair_node, pair_arms, continues = _pair_arms(mesh, first, last, ends, kind)
     arm_points = _arm_points(mesh, half_edges, offsets, start == end)
     chord = _chords(mesh, arm_points)
@@ -232,18 +247,18 @@ def street_network(layout: Layout) -> StreetNetwork:
     meet = ~continues
     same = continues & (edge_rim[pair_edges[:, 0]] == edge_rim[pair_edges[:, 1]])
     angle = included_angle(chord[pair_arms[meet, 0]], chord[pair_arms[meet, 1]])
-    edge_class = _classes(start, end, kind, degree, edge_rim, edge_level)
     return StreetNetwork(
         half_edges=half_edges,
         offsets=offsets,
         start=start,
         end=end,
         edge_rim=edge_rim,
+        edge_fixed=edge_fixed,
         edge_part=part[first >> 1],
         edge_level=edge_level,
         edge_length=_lengths(mesh, half_edges, offsets),
-        edge_class=edge_class,
-        edge_width=_widths(layout, edge_class),
+        edge_class=classes,
+        edge_width=_widths(layout, classes, edge_fixed),
         edge_street=_components(n_edges, pair_edges[same]),
         node_vertex=node_vertex,
         node_part=node_part,
@@ -257,12 +272,20 @@ def street_network(layout: Layout) -> StreetNetwork:
 
 
 def _network_edges(
-    mesh: PlanarMesh, street: BoolArray, rim: BoolArray, part: IntArray
+    mesh: PlanarMesh,
+    street: BoolArray,
+    sort: IntArray,
+    rim: BoolArray,
+    entry: BoolArray,
+    part: IntArray,
 ) -> tuple[IntArray, IntArray]:
-    """Half-edges of each network edge in order, from its lexicographically lower end."""
+    """Half-edges of each network edge in order, from its lexicographically lower end.
+
+    The mesh edges of a network edge are of one `sort` (E,).
+    """
     rank = _coordinate_rank(mesh)
     half = np.flatnonzero(np.repeat(street, 2))
-    following = _continuation(mesh, half, rim)
+    following = _continuation(mesh, half, sort, rim, entry)
     starts = np.ones(len(mesh.origin), dtype=bool)
     starts[following[following >= 0]] = False
     # half-edges that leave a node come first, so that the leader of a cycle is one of them
@@ -281,16 +304,18 @@ def _network_edges(
     return half[order], np.append(new, len(order))
 
 
-def _continuation(mesh: PlanarMesh, half: IntArray, rim: BoolArray) -> IntArray:
+def _continuation(
+    mesh: PlanarMesh, half: IntArray, sort: IntArray, rim: BoolArray, entry: BoolArray
+) -> IntArray:
     """(2E,) street half-edge that goes on from the head of one; -1 where a node stops it."""
     out = np.full(len(mesh.origin), -1)
     degree = np.bincount(mesh.origin[half], minlength=mesh.n_vertices)
     by_origin = half[np.argsort(mesh.origin[half], kind="stable")]
-    twos = np.searchsorted(mesh.origin[by_origin], np.flatnonzero(degree == 2))
+    twos = np.searchsorted(mesh.origin[by_origin], np.flatnonzero((degree == 2) & ~entry))
     a, b = by_origin[twos], by_origin[twos + 1]
-    rim_a, rim_b = rim[a >> 1], rim[b >> 1]
     d = _directions(mesh)
-    on = (rim_a == rim_b) & (rim_a | (included_angle(d[a], d[b]) > STRAIGHT_DEG))
+    same = sort[a >> 1] == sort[b >> 1]
+    on = same & (rim[a >> 1] | (included_angle(d[a], d[b]) > STRAIGHT_DEG))
     out[a[on] ^ 1] = b[on]
     out[b[on] ^ 1] = a[on]
     return out
@@ -324,7 +349,7 @@ def _pair_arms(
     arm_points
         Ends of the chords.
     """
-    arms = np.flatnonzero(node_kind[arm_node] == NodeKind.JUNCTION)
+    arms = np.flatnonzero(node_kind[arm_node] >= NodeKind.JUNCTION)
     arms = arms[np.lexsort((arms % max(len(first), 1), arm_node[arms]))]
     node = arm_node[arms]
     local = pairs_at_nodes(node)
@@ -366,10 +391,11 @@ def _classes(
     node_degree: IntArray,
     rim: BoolArray,
     level: IntArray,
+    fixed: BoolArray,
 ) -> npt.NDArray[np.str_]:
     """(K,) class of each network edge, by the rule that `StreetNetwork` states."""
     out = np.full(len(start), StreetClass.LOCAL.value, dtype="<U10")
-    levels = np.unique(level[~rim])
+    levels = np.unique(level[~rim & ~fixed])
     if len(levels):
         out[level <= levels[(len(levels) - 1) // 2]] = StreetClass.COLLECTOR.value
     # edges that follow one another at bends lead to the same places
@@ -384,10 +410,23 @@ def _classes(
     return out
 
 
-def _widths(layout: Layout, edge_class: npt.NDArray[np.str_]) -> FloatArray:
-    """(K,) nominal width of each network edge by its class."""
-    width = layout.street_rules.width_m
-    return np.array([width[c] for c in edge_class.tolist()], dtype=np.float64)
+def _given_classes(
+    classes: npt.NDArray[np.str_], given: Sequence[GivenStreet], fixed: IntArray
+) -> npt.NDArray[np.str_]:
+    """Put in the classes that the user gave, or else *fixed* on streets that are no rim."""
+    out = classes.tolist()
+    for k in np.flatnonzero(fixed >= 0).tolist():
+        plain = StreetClass.RIM if out[k] == StreetClass.RIM else StreetClass.FIXED
+        out[k] = given[fixed[k]].street_class or plain.value
+    return np.array(out, dtype=np.str_)
+
+
+def _widths(layout: Layout, classes: npt.NDArray[np.str_], fixed: IntArray) -> FloatArray:
+    """(K,) width that the user gave a street, else that of its class, or of a fixed street."""
+    nominal = layout.street_rules.width_m
+    width = [nominal.get(c, nominal[StreetClass.FIXED]) for c in classes.tolist()]
+    own = np.array([math.nan, *(street.width for street in layout.fixed_streets)])[fixed + 1]
+    return np.where(np.isnan(own), width, own)
 
 
 def _components(n: int, pairs: IntArray) -> IntArray:

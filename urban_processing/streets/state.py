@@ -54,7 +54,10 @@ class StreetState:
         self.side = math.sqrt(float(mesh.face_area.mean()))
         interior = layout.chain_kind == EdgeKind.INTERIOR
         usable = interior | layout.chain_street
-        self.interior: list[bool] = interior.tolist()
+        # streets that the user gave stay
+        self.removable: list[bool] = (interior & ~layout.chain_fixed).tolist()
+        self.fixed: list[bool] = layout.chain_fixed.tolist()
+        self.entry: list[bool] = layout.vertex_entry[graph.node_vertex].tolist()
         self.usable: list[bool] = usable.tolist()
         self.street: list[bool] = layout.chain_street.tolist()
         self.start: list[int] = graph.start.tolist()
@@ -69,7 +72,8 @@ class StreetState:
         streets = np.flatnonzero(layout.chain_street)
         self.degree: list[int] = np.bincount(graph.start[streets], minlength=graph.n_nodes).tolist()
         self.frontage: list[float] = layout.frontage.tolist()
-        self.need: list[float] = _needs(layout, usable, params.frontage_limit).tolist()
+        self.least_frontage = params.frontage_limit
+        self.need: list[float] = _needs(layout, usable, self.least_frontage).tolist()
         self.part: list[int] = layout.face_part.tolist()
         self.journal: list[int] = []
         self.part_has_streets: list[bool] = _parts_with_streets(layout)
@@ -126,9 +130,17 @@ class StreetState:
 
         It shares the streets, so that what is laid in the view is laid here.
         """
+        return self._with(self.layout.chain_kind == EdgeKind.HOLE)
+
+    def with_rims(self) -> StreetState:
+        """Return the same view with streets that may run along every rim."""
+        return self._with(np.ones(self.graph.n_chains, dtype=bool))
+
+    def _with(self, chains: BoolArray) -> StreetState:
         view = copy.copy(self)
-        usable = np.array(self.usable) | (self.layout.chain_kind == EdgeKind.HOLE)
+        usable = np.array(self.usable) | chains
         view.usable = usable.tolist()
+        view.need = _needs(self.layout, usable, self.least_frontage).tolist()
         view.ahead, view.aside, view.follow = _successors(self.graph, usable)
         return view
 
@@ -275,4 +287,4 @@ def _needs(layout: Layout, usable: BoolArray, least: float) -> FloatArray:
         required_frontage(layout.mesh.face_area, least=least) * (1.0 + 1e-9),
         possible * (1.0 - 1e-9),
     )
-    return np.where(layout.face_locked, 0.0, need)
+    return np.asarray(need)

@@ -13,6 +13,7 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, linear_rings
 from urban_processing.site import GRID, snap_to_grid
+from urban_processing.subdivision.attach import BARE, usable_edges
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.parcels import ParcelRings
 from urban_processing.subdivision.streamline import Cut
@@ -48,18 +49,21 @@ def insert_cuts(
     *,
     min_area: float,
     tee_snap: float = TEE_SNAP,
+    attached: bool = True,
 ) -> tuple[Layout, BoolArray, IntArray]:
     """Cut each parcel by the first of its ranked cuts that leaves two legal halves.
 
     A half is legal if its ring is simple and its area at least `min_area` after all snapping
-    and rounding. A cut that fails is tried again without snapping, then the next one.
+    and rounding. With `attached`, a cut begins or ends where streets may run, if they may run
+    anywhere along its parcel. A cut that fails is tried again without snapping, then the next
+    one.
 
     Returns
     -------
     layout, done, parent
         The cut layout, (P,) which parcels were cut, and (F,) the face before of each face.
     """
-    inserter = _Inserter(layout, parcels, min_area)
+    inserter = _Inserter(layout, parcels, min_area, attached=attached)
     done = np.zeros(len(parcels.face), dtype=bool)
     most = max((len(cuts) for cuts in ranked), default=0)
     for place in range(most):
@@ -75,7 +79,9 @@ def insert_cuts(
 class _Inserter:
     """The editor with what is needed to draft, check and draw cuts."""
 
-    def __init__(self, layout: Layout, parcels: ParcelRings, min_area: float) -> None:
+    def __init__(
+        self, layout: Layout, parcels: ParcelRings, min_area: float, *, attached: bool
+    ) -> None:
         self.layout, self.parcels, self.min_area = layout, parcels, min_area
         self.editor = MeshEditor(layout.mesh)
         self.scale = np.sqrt(layout.mesh.face_area[parcels.face]).tolist()
@@ -83,6 +89,12 @@ class _Inserter:
         self.n_old = layout.mesh.n_vertices
         self.tees: list[int] = []
         self.target = layout.mesh.target
+        on = parcels.network != BARE
+        has_network = np.logical_or.reduceat(on, parcels.offsets[:-1]) if len(on) else on
+        # parcels whose cuts must begin or end on the graph of edges where streets may run
+        must = has_network & ~np.logical_and.reduceat(on, parcels.offsets[:-1]) if len(on) else on
+        self.must_attach: list[bool] = (must & attached).tolist()
+        self.usable: list[bool] = usable_edges(layout).tolist()
 
     def draft(self, row: int, cut: Cut, snap: float) -> _Draft | None:
         """Resolve both ends; None where they fall together."""
@@ -90,8 +102,16 @@ class _Inserter:
         stop = self._end(row, cut.edge_b, cut.along_b, snap)
         if start == stop:
             return None
+        if self.must_attach[row] and not (self._is_attached(start) or self._is_attached(stop)):
+            return None
         path = _with_ends(cut.path, self._xy(start), self._xy(stop))
         return _Draft(row, start, stop, path)
+
+    def _is_attached(self, vertex: int) -> bool:
+        """Whether a street may lead to a vertex."""
+        e = self.editor
+        parents = (e.edge_parent[h >> 1] for h in e.outgoing(vertex))
+        return any(parent < 0 or self.usable[parent] for parent in parents)
 
     def _xy(self, vertex: int) -> tuple[float, float]:
         return self.editor.x[vertex], self.editor.y[vertex]

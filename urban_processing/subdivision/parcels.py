@@ -9,12 +9,17 @@ import numpy as np
 
 from urban_processing.fields.rings import ComplexArray, RingBatch, cross, make_batch, pad
 from urban_processing.hashing import UintArray
-from urban_processing.layout import EdgeKind, Layout
+from urban_processing.layout import Layout
 from urban_processing.mesh.corners import reported_polygons, ring_neighbours, thin_corners
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.subdivision.attach import BARE, edge_networks
 
 CONTINUES_ANGLE = np.radians(20.0)
 """Largest angle between a cut and the neighbour's cut that it continues (Yang 2013, 5)."""
+
+
+AT_VERTEX = 1e-9
+"""A place within this share of an edge from its end is that end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +36,10 @@ class ParcelRings:
         (P + 1,) ring p is entries ``offsets[p]`` to ``offsets[p + 1]``.
     half_edge, xy
         (R,) half-edge, and (R, 2) position of its origin.
-    street, usable
-        (R,) whether the half-edge is street, and whether it is or could become one.
+    street
+        (R,) whether the half-edge is street.
+    network
+        (R,) connected piece of the graph of edges where streets may run, `BARE` for others.
     corner
         (R,) whether the vertex is a corner of the parcel's approximate polygon.
     node
@@ -48,7 +55,7 @@ class ParcelRings:
     half_edge: IntArray
     xy: FloatArray
     street: BoolArray
-    usable: BoolArray
+    network: IntArray
     corner: BoolArray
     node: BoolArray
     inward: ComplexArray
@@ -84,7 +91,7 @@ def parcel_rings(layout: Layout, faces: IntArray) -> ParcelRings:
         half_edge=h,
         xy=xy,
         street=layout.edge_street[h >> 1],
-        usable=(layout.edge_street | (layout.edge_kind == EdgeKind.INTERIOR))[h >> 1],
+        network=edge_networks(layout)[h >> 1],
         corner=_ring_corners(layout, xy, offsets, vertex),
         node=node,
         inward=_continuations(layout, h, offsets),
@@ -139,7 +146,7 @@ class Boundary:
 
     rings: RingBatch
     street: BoolArray
-    usable: BoolArray
+    network: IntArray
     corner: BoolArray
     node: BoolArray
     inward: ComplexArray
@@ -194,6 +201,11 @@ class Boundary:
         return self._sum_where(self.street)
 
     @cached_property
+    def usable(self) -> BoolArray:
+        """(B, N) edges that are or could be street."""
+        return np.asarray((self.network != BARE) & self.rings.valid)
+
+    @cached_property
     def _usable_sum(self) -> FloatArray:
         return self._sum_where(self.usable)
 
@@ -241,6 +253,26 @@ class Boundary:
         part = part - self._length_to(total, chosen, parcel, start)
         return np.asarray(part + np.where(stop < start, total[parcel, -1], 0.0))
 
+    def is_attached(self, parcel: IntArray, t: FloatArray) -> BoolArray:
+        """Whether a place of the ring lies on an edge where streets may run, or at its end."""
+        k, along = self.locate(parcel, t)
+        n = self.rings.count[parcel]
+        k = np.minimum(k, n - 1)
+        on = self.network != BARE
+        before, after = on[parcel, (k - 1) % n], on[parcel, (k + 1) % n]
+        at_start, at_end = along <= AT_VERTEX, along >= 1.0 - AT_VERTEX
+        return np.asarray(on[parcel, k] | (at_start & before) | (at_end & after))
+
+    @cached_property
+    def has_network(self) -> BoolArray:
+        """(B,) whether streets may run along some edge of the ring."""
+        return np.asarray(((self.network != BARE) & self.rings.valid).any(axis=1))
+
+    @cached_property
+    def has_bare(self) -> bool:
+        """Whether there is an edge in the batch that no street may run along."""
+        return bool(((self.network == BARE) & self.rings.valid).any())
+
     @cached_property
     def corners(self) -> tuple[FloatArray, ComplexArray, IntArray]:
         """(B, M) lengths and positions of the corners in ring order, and (B,) their number."""
@@ -261,7 +293,7 @@ def boundaries(parcels: ParcelRings, rows: IntArray) -> Boundary:
     return Boundary(
         rings=rings,
         street=np.asarray(pad(parcels.street, o, rows), dtype=bool),
-        usable=np.asarray(pad(parcels.usable, o, rows), dtype=bool),
+        network=np.asarray(pad(parcels.network, o, rows), dtype=np.int64),
         corner=np.asarray(pad(parcels.corner, o, rows), dtype=bool) & valid,
         node=np.asarray(pad(parcels.node, o, rows), dtype=bool) & valid,
         inward=np.asarray(pad(parcels.inward, o, rows)) * np.conj(rings.axis)[:, None] * valid,

@@ -205,9 +205,11 @@ def join_pairs(layout: Layout, pairs: list[Pair]) -> tuple[Layout, npt.NDArray[n
         editor.remove_chain(list(pair.chain))
         level[pair.keeps] = min(level[pair.keeps], level[pair.goes]) - 1
         for vertex in ends:
-            if editor.valence[vertex] == 2 and not layout.vertex_corner[vertex]:
-                edges = [editor.edge_parent[h >> 1] for h in editor.outgoing(vertex)]
-                if layout.edge_street[edges[0]] == layout.edge_street[edges[1]]:
+            given = layout.vertex_corner[vertex] or layout.vertex_entry[vertex]
+            if editor.valence[vertex] == 2 and not given:
+                a, b = (editor.edge_parent[h >> 1] for h in editor.outgoing(vertex))
+                edge_tables = layout.edge_street, layout.edge_fixed, layout.edge_kind
+                if all(values[a] == values[b] for values in edge_tables):
                     _straighten(editor, vertex)
     mesh, remap = editor.commit()
     return layout.replace(face_level=level).with_mesh(mesh, remap), remap.face

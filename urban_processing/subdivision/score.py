@@ -136,6 +136,9 @@ def score_cuts(
     )
     if params.frontage_limit > 0:
         legal &= _possible_frontage(boundary, cuts.parcel, t_a, t_b, b - a) >= least[:, 0]
+    if boundary.has_bare:
+        attached = boundary.is_attached(cuts.parcel, t_a) | boundary.is_attached(cuts.parcel, t_b)
+        legal &= attached | ~boundary.has_network[cuts.parcel]
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)

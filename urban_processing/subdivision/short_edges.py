@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from urban_processing.layout import Layout
+from urban_processing.layout import NOT_FIXED, Layout
 from urban_processing.mesh.corners import (
     mean_side_length,
     polygon_irregularity,
@@ -81,7 +81,16 @@ class _Merger:
     def __init__(self, layout: Layout, min_area: float) -> None:
         self.editor = MeshEditor(layout.mesh)
         self.min_area = min_area
-        self.corner: list[bool] = layout.vertex_corner.tolist()
+        # these stay where they are: corners, entries, and all of the streets that were given
+        fixed = layout.edge_fixed != NOT_FIXED
+        at_fixed = np.bincount(
+            layout.mesh.origin, weights=np.repeat(fixed, 2), minlength=layout.mesh.n_vertices
+        )
+        node = layout.vertex_corner | layout.vertex_entry
+        self.corner: list[bool] = (node | (at_fixed > 0)).tolist()
+        # what follows a vertex that moves ends where a given street begins
+        node |= (at_fixed > 0) & (at_fixed < layout.mesh.valence)
+        self.node: list[bool] = node.tolist()
         self.on_rim: list[bool] = layout.mesh.vertex_is_boundary.tolist()
         self.locked: list[bool] = layout.face_locked.tolist()
         loops = layout.mesh.loops
@@ -106,7 +115,7 @@ class _Merger:
         return batch, later
 
     def _is_node(self, vertex: int) -> bool:
-        return self.editor.valence[vertex] > 2 or self.corner[vertex]
+        return self.editor.valence[vertex] > 2 or self.node[vertex]
 
     def _intact(self, chain: list[int]) -> bool:
         """Whether a chain still runs from node to node as it did."""
@@ -132,8 +141,10 @@ class _Merger:
         if self._rank(goes) > self._rank(stays):
             chain = [h ^ 1 for h in reversed(chain)]
             stays, goes = goes, stays
+        if self.corner[goes]:
+            return None
         if at_rim:
-            if self.corner[goes] or not self._slides(goes, chain):
+            if not self._slides(goes, chain):
                 return None
         elif self.on_rim[goes]:
             return None  # both ends lie on the rim: the land would be pinched

@@ -112,7 +112,7 @@ def propose_cuts(
         )
         chosen, rank = rank_cuts(boundary, scored)
         order = np.lexsort((rank, cuts.parcel[chosen]))
-        for row, cut in _as_cuts(boundary, scored, chosen[order]):
+        for row, cut in as_cuts(boundary, scored, chosen[order]):
             out[rows[row]].append(cut)
     return out
 
@@ -185,7 +185,7 @@ def _field_rings(
     return rings, np.concatenate([t, close], axis=1)
 
 
-def _as_cuts(boundary: Boundary, scored: ScoredCuts, chosen: IntArray) -> Iterator[tuple[int, Cut]]:
+def as_cuts(boundary: Boundary, scored: ScoredCuts, chosen: IntArray) -> Iterator[tuple[int, Cut]]:
     """Chosen cuts in terms of the mesh: half-edges of the ring and map positions."""
     parcel = scored.cuts.parcel[chosen]
     last = boundary.rings.count[parcel] - 1

@@ -1,0 +1,1 @@
+"""What a planner gives besides the land: obstacles, locked land, streets, the rim, entries."""

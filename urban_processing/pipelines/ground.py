@@ -1,0 +1,109 @@
+"""From a site and what was given with it to the layout that a run begins with."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import shapely
+
+from urban_processing.constraints.ground import divide_land
+from urban_processing.constraints.obstacles import take_off_obstacles
+from urban_processing.constraints.rim import check_entries, place_on_rim, run_lines
+from urban_processing.errors import InfeasibleError, ParameterError
+from urban_processing.land import first_layout, simplify_site
+from urban_processing.layout import Layout
+from urban_processing.mesh.planar import OUTSIDE
+from urban_processing.params.base import option_name
+from urban_processing.params.cogenerate import CogenerateParams, ObstacleRim, RimStreet
+from urban_processing.site import Site
+
+
+def lay_ground(
+    site: Site, params: CogenerateParams, *, min_area: float, tolerance: float
+) -> Layout:
+    """Simplify the land, take the obstacles off it, and divide it by what was given.
+
+    Parameters
+    ----------
+    site
+        The land and what was given with it.
+    params
+        Which rims are streets, and the tolerance for what was given.
+    min_area
+        Smallest area in m² that a line may leave which prolongs a street.
+    tolerance
+        Tolerance in metres of the simplification of the boundary; 0 for none.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        If obstacles cover the land or an entry, or layers and parameters contradict.
+    """
+    problems = params.contradictions_with(given_layers(site), option_name)
+    if problems:
+        raise ParameterError(problems)
+    snap = params.snap_tolerance
+    site, runs, places = place_on_rim(site, snap=snap)
+    site = simplify_site(site, tolerance, keep=places)
+    lines = run_lines(site, runs)
+    site = take_off_obstacles(site, narrow=max(tolerance, snap), min_area=min_area)
+    if len(site.entries):
+        check_entries(site)
+    rim = params.rim
+    if rim is None and (lines or not site.rim_is_street):
+        rim = RimStreet.ALONG_LINES if lines else RimStreet.NONE
+    site = dataclasses.replace(
+        site, rim_is_street=rim in (None, RimStreet.STREET, RimStreet.EXCEPT_LINES)
+    )
+    return first_layout(
+        site,
+        min_area=min_area,
+        ground=divide_land(site, min_area=min_area, snap=snap),
+        rim_lines=lines,
+        obstacle_rim_is_street=params.obstacle_rim is ObstacleRim.STREET,
+    )
+
+
+def refuse_islands(layout: Layout, *, min_area: float) -> None:
+    """Make sure that no locked land and no ring of streets stands free within a parcel.
+
+    Raises
+    ------
+    InfeasibleError
+        With one sentence for each parcel that could not be cut through what it surrounds.
+    """
+    mesh = layout.mesh
+    inner = np.ones(len(mesh.loops.face), dtype=bool)
+    inner[mesh.face_loop] = False
+    inner &= mesh.loops.face != OUTSIDE
+    first = mesh.loops.half_edges[mesh.loops.offsets[:-1]]
+    islands = inner & (mesh.face[first ^ 1] != OUTSIDE)
+    around = np.unique(mesh.loops.face[islands])
+    if len(around):
+        raise InfeasibleError(
+            f"Locked land or a ring of given streets lies within {mesh.face_area[f]:.0f} m² that "
+            f"cannot be cut around it into parcels of {min_area:.0f} m²: no street can lead "
+            "there. Give a smaller smallest parcel, or leave it out."
+            for f in around.tolist()
+        )
+
+
+def given_layers(site: Site) -> set[str]:
+    """Names of the layers that were given with a site."""
+    layers = {
+        "streets": site.fixed_streets,
+        "obstacles": site.obstacles,
+        "locked": site.locked,
+        "rim_lines": site.rim_lines,
+        "entries": site.entries,
+    }
+    return {name for name, values in layers.items() if len(values)}
+
+
+def land_area(site: Site) -> float:
+    """Area in m² of the land that parcels are made of: without obstacles and locked land."""
+    closed = [*site.obstacles, *(each.polygon for each in site.locked)]
+    if not closed:
+        return site.area
+    return float(shapely.difference(shapely.union_all(site.parts), shapely.union_all(closed)).area)

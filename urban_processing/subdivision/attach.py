@@ -1,0 +1,35 @@
+"""Where streets may run: the graph that cuts must keep in one piece.
+
+Streets run along cuts and along rims that are street. Where a rim is no street, a cut from rim
+to rim would start a graph of its own, and no street could lead from it to the rest. So every cut
+begins or ends on the graph of its part, once there is one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.planar import BoolArray, IntArray
+
+BARE = -1
+"""Label of edges that no street may run along."""
+
+
+def usable_edges(layout: Layout) -> BoolArray:
+    """(E,) edges that are street or may become street."""
+    return np.asarray((layout.edge_kind == EdgeKind.INTERIOR) | layout.edge_street)
+
+
+def edge_networks(layout: Layout) -> IntArray:
+    """(E,) connected piece of the graph of usable edges; `BARE` for the others."""
+    mesh = layout.mesh
+    on = usable_edges(layout)
+    a, b = mesh.origin.reshape(-1, 2)[on].T
+    n = mesh.n_vertices
+    _, label = connected_components(
+        coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False
+    )
+    return np.where(on, label[mesh.origin[0::2]], BARE)
