@@ -37,7 +37,8 @@ COGENERATE = AlgorithmSpec(
         "reached and the network stays connected. In the end the geometry is optimized: streets "
         "and parcel sides become smoother, parcels and junctions more regular.\n\n"
         "Each connected part of the land gets a layout and a network of its own. Holes stay "
-        "empty. The rim of the land is street."
+        "empty. The rim of the land is street. In the end the rights-of-way of all streets are cut "
+        "out of the parcels."
     ),
     params=CogenerateParams,
     inputs=(
