@@ -39,7 +39,7 @@ COGENERATE = AlgorithmSpec(
         "Each connected part of the land gets a layout and a network of its own. Holes stay "
         "empty. The rim of the land is street, as a whole unless told otherwise. Streets that are "
         "given belong to the network from the start; no cut and no street crosses obstacles or "
-        "locked land."
+        "locked land. In the end the rights-of-way of all streets are cut out of the parcels."
     ),
     params=CogenerateParams,
     inputs=(
