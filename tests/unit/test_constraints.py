@@ -13,7 +13,7 @@ import shapely.affinity
 import shapely.ops
 from lands import LANDS, ell, ellipse, site_of, star
 
-from urban_processing.errors import BoundaryError, ParameterError
+from urban_processing.errors import BoundaryError, InfeasibleError, ParameterError
 from urban_processing.layout import NOT_FIXED, EdgeKind, Layout
 from urban_processing.metrics import certificate
 from urban_processing.metrics.tables import junction_table, obstacle_table, street_table
@@ -119,6 +119,20 @@ def test_a_lakeside_road_is_part_of_the_network(obstacle: shapely.Polygon) -> No
     shore = layout.edge_kind == EdgeKind.OBSTACLE
     assert shore.any()
     assert layout.edge_street[shore].all()
+
+
+def test_no_road_around_a_lake_that_no_street_can_lead_to() -> None:
+    pond = shapely.Point(200, 200).buffer(20)
+    layout = laid_out(given(obstacles=(pond,)), parcels=1, obstacle_rim="street")
+    assert not layout.edge_street[layout.edge_kind == EdgeKind.OBSTACLE].any()
+    (told,) = [i for i in layout.issues if i.code == "shore_without_street"]
+    assert told.value == pytest.approx(pond.length, rel=1e-3)
+
+
+def test_locked_land_that_no_street_can_lead_to_is_refused() -> None:
+    estate = LockedLand(shapely.box(150, 150, 250, 250))
+    with pytest.raises(InfeasibleError, match="no street can lead there"):
+        laid_out(given(locked=(estate,)), parcels=None, min_area=100_000)
 
 
 def test_overlapping_obstacles_count_once_and_those_outside_are_told_of() -> None:

@@ -18,7 +18,7 @@ from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines.dimensions import check_dimensions, missed_dimensions
 from urban_processing.pipelines.findings import findings
-from urban_processing.pipelines.ground import land_area, lay_ground, refuse_islands
+from urban_processing.pipelines.ground import land_area, lay_ground, settle_islands
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
@@ -192,7 +192,7 @@ def begin(site: Site, params: CogenerateParams) -> State:
     layout, parent = cut_through_holes(layout, min_area=min_area)
     if quota is not None:
         quota = divided(quota, parent, layout.mesh.face_area)
-    refuse_islands(layout, min_area=min_area)
+    layout = settle_islands(layout, min_area=min_area)
     layout, parent = tie_together(layout, min_area=min_area, params=params)
     if quota is not None:
         quota = divided(quota, parent, layout.mesh.face_area)

@@ -16,7 +16,7 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.params.base import option_name
 from urban_processing.params.cogenerate import CogenerateParams, ObstacleRim, RimStreet
-from urban_processing.site import Site
+from urban_processing.site import Issue, Site
 
 
 def lay_ground(
@@ -65,21 +65,24 @@ def lay_ground(
     )
 
 
-def refuse_islands(layout: Layout, *, min_area: float) -> None:
-    """Make sure that no locked land and no ring of streets stands free within a parcel.
+def settle_islands(layout: Layout, *, min_area: float) -> Layout:
+    """Take streets off the shores of lakes within a parcel that could not be cut through them.
+
+    No street could lead there; it is told of.
 
     Raises
     ------
     InfeasibleError
-        With one sentence for each parcel that could not be cut through what it surrounds.
+        With one sentence for each parcel with locked land or a ring of given streets in it that
+        could not be cut through what it surrounds.
     """
     mesh = layout.mesh
-    inner = np.ones(len(mesh.loops.face), dtype=bool)
+    loops = mesh.loops
+    inner = loops.face != OUTSIDE
     inner[mesh.face_loop] = False
-    inner &= mesh.loops.face != OUTSIDE
-    first = mesh.loops.half_edges[mesh.loops.offsets[:-1]]
-    islands = inner & (mesh.face[first ^ 1] != OUTSIDE)
-    around = np.unique(mesh.loops.face[islands])
+    first = loops.half_edges[loops.offsets[:-1]]
+    is_land = mesh.face[first ^ 1] != OUTSIDE
+    around = np.unique(loops.face[inner & is_land])
     if len(around):
         raise InfeasibleError(
             f"Locked land or a ring of given streets lies within {mesh.face_area[f]:.0f} m² that "
@@ -87,6 +90,20 @@ def refuse_islands(layout: Layout, *, min_area: float) -> None:
             "there. Give a smaller smallest parcel, or leave it out."
             for f in around.tolist()
         )
+    shore = loops.half_edges[inner[loops.of_half_edge[loops.half_edges]]] >> 1
+    shore = shore[layout.edge_street[shore]]
+    if not len(shore):
+        return layout
+    street, level = layout.edge_street.copy(), layout.edge_level.copy()
+    street[shore], level[shore] = False, -1
+    length = float(mesh.edge_length[shore].sum())
+    issue = Issue(
+        code="shore_without_street",
+        message=f"{length:.0f} m of the rims of obstacles are no street: their parcels are too "
+        "small to be cut, so that no street can lead there.",
+        value=length,
+    )
+    return layout.replace(edge_street=street, edge_level=level, issues=(*layout.issues, issue))
 
 
 def given_layers(site: Site) -> set[str]:
