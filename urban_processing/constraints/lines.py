@@ -16,6 +16,10 @@ ALONG = 8.0
 lines that cross do so for less, unless they meet at less than 15°."""
 
 
+SAME = 1e-3
+"""A line that comes this near in metres to a vertex of the rim meets it."""
+
+
 @dataclass(frozen=True)
 class Piece:
     """A piece of a given street; `street` is its number."""
@@ -53,7 +57,14 @@ def ready_streets(
                 count.outside += line.length - sum(g.length for g in inside)
                 pieces += [Piece(g, number) for g in inside]
     pieces = _without_doubles(pieces, snap, count)
-    return _joined(pieces, rim, snap), count.issues(streets, pieces, snap)
+    pieces = [Piece(_on_vertices(p.line, rim), p.street) for p in _joined(pieces, rim, snap)]
+    return pieces, count.issues(streets, pieces, snap)
+
+
+def _on_vertices(line: shapely.LineString, rim: shapely.Geometry) -> shapely.LineString:
+    """The line by way of the vertices of the rim that it all but meets."""
+    met = shapely.snap(line, rim, SAME)
+    return met if met.geom_type == "LineString" and not met.is_empty else line
 
 
 @dataclass
@@ -201,8 +212,10 @@ def _joined(pieces: Sequence[Piece], rim: shapely.Geometry, snap: float) -> list
         if place is None:
             free.append((i, k))
         else:
-            lines[i][k] = place
-            settled.append(place)
+            # two feet on one edge of the rim may differ by a rounding error
+            same = [p for p in settled if np.hypot(*(p - place)) <= SAME]
+            lines[i][k] = same[0] if same else place
+            settled.append(lines[i][k].copy())
     alone = []
     for i, k in free:
         near = [p for p in settled if np.hypot(*(p - lines[i][k])) <= snap]

@@ -114,9 +114,11 @@ def _without_narrows(
         return [part]
     style = {"join_style": "mitre", "mitre_limit": MITRE_LIMIT}
     core = shapely.buffer(shapely.buffer(part, -0.5 * width, **style), 0.5 * width, **style)
+    # buffers with mitres may come out invalid
+    core = shapely.make_valid(core, method="structure", keep_collapsed=False)
     narrow = [
         piece
-        for piece in _polygons(shapely.difference(part, core))
+        for piece in _polygons(shapely.difference(part, core, grid_size=GRID))
         if piece.area > NARROW_AREA * width * width
         and shapely.dwithin(piece, obstacles, HAIR * width)
     ]
