@@ -10,11 +10,14 @@ import argparse
 import io
 import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
+import geopandas as gpd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
+from shapely import LineString
 
 import urban_processing as up
 from urban_processing.io.frames import GeoLayout
@@ -25,7 +28,7 @@ COLUMN, MARGIN, HEAD, FOOT = 5.6, 0.15, 0.5, 0.6
 """Width of one map, and the room beside, above and below it, in inches."""
 
 DOTS_PER_INCH = 100
-COLOURS = 96
+COLOURS = 256
 """Colours of a picture: few make small files."""
 
 MOST_BYTES = 250_000
@@ -110,12 +113,92 @@ def three_weights() -> Figure:
 
 
 def three_patterns() -> Figure:
-    """Patterns of streets (Fig. 14)."""
+    """Patterns of streets, on a rim that is street, street in part, and none (Fig. 14)."""
+    west = gpd.GeoSeries([in_land([(-0.02, 1.0), (-0.02, 0.3), (0.2, -0.1)])], crs=land().crs)
+    rims: dict[str, dict[str, object]] = {
+        "loop": {},
+        "cul-de-sac": {"rim_lines": west.buffer(170).intersection(land().boundary.iloc[0])},
+        "tree": {"rim": "none"},
+    }
     panels = []
-    for pattern in ("loop", "cul-de-sac", "tree"):
-        layout = laid_out("irregular_64ha", parcels=200, pattern=pattern)
+    for pattern, rim in rims.items():
+        layout = laid_out("irregular_64ha", parcels=200, pattern=pattern, **rim)
         panels.append((f"{pattern}: {figure(layout, 'street_ends'):.0f} street ends", layout))
     return sheet(panels, columns=3, ratio=0.9)
+
+
+def optimization() -> Figure:
+    """A layout before and after the optimization (Fig. 10)."""
+    panels = []
+    for title, optimize in (("before", False), ("after", True)):
+        layout = laid_out("irregular_64ha", parcels=90, optimize=optimize)
+        values = (
+            f"I = {figure(layout, 'irregularity_mean'):.4f}, "
+            f"junctions off 90° by {figure(layout, 'junction_deviation_deg'):.1f}°"
+        )
+        panels.append((f"{title}: {values}", layout))
+    return sheet(panels, columns=2, ratio=0.9)
+
+
+def given_things() -> Figure:
+    """Streets that are given (Fig. 15b and 19), a lake, a lakeside road, locked land."""
+    streets = frame(
+        in_land([(-0.1, 0.35), (0.45, 0.27), (1.1, 0.4)]), in_land([(0.3, 1.1), (0.34, 0.55)])
+    )
+    lake = frame(in_land([(0.43, 0.45), (0.6, 0.5)]).buffer(70))
+    estate = frame(in_land([(0.2, 0.75), (0.3, 0.72)]).buffer(60, cap_style="flat"))
+    given: dict[str, dict[str, object]] = {
+        "two given streets": {"streets": streets},
+        "a lake": {"obstacles": lake},
+        "a lakeside road": {"obstacles": lake, "obstacle_rim": "street"},
+        "streets, a lake and an estate": {
+            "streets": streets,
+            "obstacles": lake,
+            "locked": estate,
+        },
+    }
+    panels = []
+    for title, things in given.items():
+        layout = laid_out("irregular_64ha", parcels=200, **things)
+        panels.append((f"{title}: I = {figure(layout, 'irregularity_mean'):.3f}", layout))
+    return sheet(panels, columns=2, ratio=0.9)
+
+
+def rights_of_way() -> Figure:
+    """Rights-of-way and net parcels: corners, turning heads, a given street of 24 m."""
+    streets = frame(in_land([(-0.1, 0.35), (0.45, 0.27), (1.1, 0.4)]), width_m=[24.0])
+    layout = laid_out("irregular_64ha", parcels=200, pattern="cul-de-sac", streets=streets)
+    drawn = Figure(figsize=(2 * COLUMN, COLUMN), facecolor="white")
+    FigureCanvasAgg(drawn)
+    windows = {"the whole": (-0.02, -0.02, 1.02, 1.02), "a part of it": (0.15, 0.05, 0.5, 0.4)}
+    for k, (title, (x0, y0, x1, y1)) in enumerate(windows.items()):
+        ax = drawn.add_axes((k / 2 + 0.01, 0.01, 0.48, 0.92))
+        layout.frame("right_of_way").plot(ax=ax, color="#cfcbbd")
+        layout.frame("net_parcels").plot(ax=ax, color="#f4f2ea", edgecolor="#8d8a80", linewidth=0.6)
+        layout.streets.plot(ax=ax, color="#b08a2c", linewidth=0.6, linestyle="--")
+        (left, low), (right, high) = in_land([(x0, y0), (x1, y1)]).coords
+        ax.set(xlim=(left, right), ylim=(low, high), aspect="equal")
+        ax.axis("off")
+        net = figure(layout, "right_of_way_pct")
+        ax.set_title(f"{title}: {net:.0f} % right-of-way" if k == 0 else title, loc="left", size=11)
+    return drawn
+
+
+@cache
+def land() -> gpd.GeoSeries:
+    """The land of most pictures."""
+    return gpd.read_file(ROOT / "sample_data" / "irregular_64ha.gpkg").geometry
+
+
+def in_land(places: Sequence[tuple[float, float]]) -> LineString:
+    """A line through places given as shares of the land's width and height."""
+    x0, y0, x1, y1 = land().total_bounds
+    return LineString([(x0 + a * (x1 - x0), y0 + b * (y1 - y0)) for a, b in places])
+
+
+def frame(*geometry: object, **columns: object) -> gpd.GeoDataFrame:
+    """Geometries as a layer in the CRS of the land."""
+    return gpd.GeoDataFrame(columns, geometry=list(geometry), crs=land().crs)
 
 
 def two_orientations() -> Figure:
@@ -152,6 +235,9 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "sizes": three_sizes,
     "weights": three_weights,
     "patterns": three_patterns,
+    "optimization": optimization,
+    "given": given_things,
+    "rights_of_way": rights_of_way,
     "orientation": two_orientations,
     "dimensions": dimensions,
 }
@@ -162,7 +248,11 @@ def write(drawn: Figure, path: Path) -> None:
     """Write a picture as a small PNG."""
     full = io.BytesIO()
     drawn.savefig(full, format="png", dpi=DOTS_PER_INCH)
-    few = Image.open(full).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    few = (
+        Image.open(full)
+        .convert("RGB")
+        .quantize(COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    )
     few.save(path, optimize=True)
     if path.stat().st_size > MOST_BYTES:
         warnings.warn(f"{path.name} has {path.stat().st_size:,} bytes.", stacklevel=2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,14 @@ from urban_processing.report.palette import (
     Scale,
 )
 from urban_processing.schema import PARCELS
+
+LEGEND_SHARE = 0.74
+"""Share of the width of the map that the legend may take; the scale bar has the rest."""
+
+LETTER_WIDTH, LETTERS_PER_SWATCH = 0.55, 5
+"""Mean width of a letter in sizes of the type; letters' worth of a swatch and the space beside."""
+
+POINTS_PER_INCH = 72.0
 
 
 def root_figure(ax: Axes) -> Figure:
@@ -129,12 +138,15 @@ def _counted(number: int, noun: str) -> str:
 
 
 def draw_legend(ax: Axes, entries: list[Patch | Line2D], scale: Scale) -> None:
-    """Draw one line of entries below the right corner of the map."""
+    """Draw the entries below the right corner of the map, in as few lines as fit beside the bar."""
+    width = ax.get_window_extent().width / root_figure(ax).dpi * POINTS_PER_INCH
+    letters = sum(len(str(entry.get_label())) + LETTERS_PER_SWATCH for entry in entries)
+    lines = math.ceil(letters * LETTER_WIDTH * scale.text / (LEGEND_SHARE * width))
     ax.legend(
         handles=entries,
         loc="upper right",
         bbox_to_anchor=(1.0, -0.005 * scale.text / _height_inches(ax)),
-        ncols=len(entries),
+        ncols=math.ceil(len(entries) / lines),
         frameon=False,
         fontsize=scale.text,
         labelcolor=INK,
