@@ -304,6 +304,18 @@ def test_a_stub_in_a_block_too_small_to_be_cut_is_left_out_and_told_of() -> None
     assert dropped.value == pytest.approx(30, abs=1)
 
 
+@pytest.mark.parametrize("name", ["crossing", "tree", "itself"])
+def test_given_streets_stay_where_net_areas_are_promised(name: str) -> None:
+    site = given(fixed_streets=tuple(LINES[name]), entries=np.array([[0.0, 60.0]]))
+    values = {"min_area": 2500, "min_area_basis": "net", "rim": "none"}
+    layout = cogenerate(site, CogenerateParams(**values))
+    wanted = shapely.intersection(shapely.union_all([s.line for s in LINES[name]]), SQUARE)
+    missing = shapely.difference(wanted, shapely.buffer(given_lines(layout), BESIDE))
+    assert missing.length < 1e-3
+    at = layout.mesh.origin[np.repeat(layout.edge_street, 2)]
+    assert np.isin(np.flatnonzero(layout.vertex_entry), at).all()
+
+
 # --- the rim
 
 
