@@ -94,7 +94,9 @@ def _locked_on(site: Site, snap: float) -> tuple[dict[int, _Locked], list[Issue]
     out: dict[int, _Locked] = {}
     lost = 0.0
     for k, given in enumerate(site.locked):
-        near = shapely.make_valid(shapely.snap(given.polygon, rim, snap))
+        near = shapely.make_valid(
+            shapely.snap(given.polygon, rim, snap), method="structure", keep_collapsed=False
+        )
         inside = shapely.intersection(near, land, grid_size=GRID)
         kept = [
             p

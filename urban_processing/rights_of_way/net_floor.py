@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from urban_processing.access_rule import MEASURED_M, reached_frontage
-from urban_processing.layout import EdgeKind, Layout
+from urban_processing.layout import NOT_FIXED, EdgeKind, Layout
 from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.rights_of_way.lay_out import lay_out_rights_of_way
@@ -58,7 +58,7 @@ def keep_net_areas(layout: Layout, min_area: float) -> Layout:
 def _too_small(layout: Layout, net: FloatArray, min_area: float) -> BoolArray:
     """(F,) parcels under the floor that are not alone in their part."""
     alone = np.bincount(layout.face_part)[layout.face_part] == 1
-    return np.asarray((net < min_area * (1.0 - AREA_ROUNDING)) & ~alone)
+    return np.asarray((net < min_area * (1.0 - AREA_ROUNDING)) & ~alone & ~layout.face_locked)
 
 
 def _joined(layout: Layout, net: FloatArray, min_area: float) -> Layout:
@@ -126,11 +126,25 @@ def _opened(layout: Layout, net: FloatArray, small: BoolArray) -> Layout:
         for face in faces:
             for run in _runs_beside(layout, face):
                 opened = _connected(_without_street(layout, run))
-                if _ends(opened) <= most_ends:
+                if _keeps_given(layout, opened) and _ends(opened) <= most_ends:
                     whole = _absorbing(opened, face, _reached(layout))
                     if whole is not None:
                         return whole
     return layout
+
+
+def _keeps_given(before: Layout, after: Layout) -> bool:
+    """Whether all given streets are streets still, and lead to the entries as before."""
+    given = after.edge_fixed != NOT_FIXED
+    led = _at_street(before) & before.vertex_entry
+    return bool(after.edge_street[given].all() and _at_street(after)[led].all())
+
+
+def _at_street(layout: Layout) -> BoolArray:
+    """(V,) vertices of streets."""
+    out = np.zeros(layout.mesh.n_vertices, dtype=bool)
+    out[layout.mesh.origin[np.repeat(layout.edge_street, 2)]] = True
+    return out
 
 
 def _absorbing(layout: Layout, face: int, reached: BoolArray) -> Layout | None:
@@ -164,6 +178,7 @@ def _runs_beside(layout: Layout, face: int) -> list[IntArray]:
     sides = mesh.face.reshape(-1, 2)
     beside = layout.edge_street & (sides == face).any(axis=1) & (sides != OUTSIDE).all(axis=1)
     beside &= (sides != face).any(axis=1) & (layout.edge_kind == EdgeKind.INTERIOR)
+    beside &= layout.edge_fixed == NOT_FIXED
     edges = np.flatnonzero(beside)
     if not len(edges):
         return []
