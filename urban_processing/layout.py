@@ -62,6 +62,9 @@ class GivenStreet:
 PARCEL_USE = "parcel"
 """Land use of a parcel that nobody gave another use."""
 
+REMNANT_USE = "remnant"
+"""Land use of what is left over between streets and too small for a parcel."""
+
 NOT_FIXED = -1
 """`Layout.edge_fixed` of edges that are no street of the user's."""
 

@@ -166,7 +166,12 @@ PARCELS = Layer(
             "1 for a square, 0.71 for 1:2, 0.5 for 1:4.",
         ),
         _boolean("rim", "Rim parcel", "Whether an edge lies on the land's rim or an obstacle."),
-        _text("land_use", "Land use", "Use of the parcel."),
+        _text(
+            "land_use",
+            "Land use",
+            "Use of the parcel: parcel, that of the locked land given, or remnant for what streets "
+            "leave too small.",
+        ),
         _boolean("locked", "Locked", "Whether the parcel is not to be cut."),
         _boolean(
             "reached",

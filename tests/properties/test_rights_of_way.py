@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lands import LANDS, holed, site_of, star
 
+import urban_processing as up
 from urban_processing.access_rule import unreached_parcels_of
 from urban_processing.layout import Layout
 from urban_processing.metrics import certificate, measure
@@ -163,3 +164,23 @@ def test_a_land_too_small_for_its_net_floor_is_one_listed_parcel() -> None:
     assert [i.code for i in layout.issues] == ["part_below_min_area"]
     assert layout.issues[0].value == pytest.approx(44 * 24 - (4 - np.pi) * 36, abs=1)
     assert certificate(layout).holds
+
+
+def test_what_given_streets_leave_too_small_is_set_aside() -> None:
+    remnants = 0
+    for seed in range(6):
+        land = star(seed, low=0.7)
+        x0, y0, x1, y1 = land.bounds
+        ends = np.random.default_rng(seed).uniform(0, 1, (3, 2, 2))
+        lines = [shapely.LineString(e * (x1 - x0, y1 - y0) + (x0, y0)) for e in ends]
+        made = up.cogenerate(
+            [land], crs="EPSG:32630", streets=lines, min_area=1500, min_area_basis="net", rim="none"
+        )
+        assert made.certificate.holds, made.certificate.failures
+        parcels = made.parcels
+        aside = parcels[parcels.land_use == "remnant"]
+        remnants += len(aside)
+        assert aside.locked.all()
+        assert set(aside.index) == set(made.issues[made.issues.code == "remnant"].parcel_id)
+        assert parcels[~parcels.locked].net_area_m2.min() >= 1500 * (1 - 1e-9)
+    assert remnants > 0

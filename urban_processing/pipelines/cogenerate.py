@@ -23,7 +23,7 @@ from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
-from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas
+from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas, set_remnants_aside
 from urban_processing.site import Site
 from urban_processing.streets.entries import choose_entries, join_along_rims
 from urban_processing.streets.generate import extend_streets
@@ -52,7 +52,7 @@ LEVELS_SHARE, RECUT_SHARE, PRUNED_SHARE = 0.6, 0.6, 0.7
 """Share of the levels in the time of a run; of cutting again, and of the clean-up of streets, in
 the time after them."""
 
-SECONDS_PER_PARCEL = 1.8e-3
+SECONDS_PER_PARCEL = 2.6e-3
 """For the estimate that is given before a long run; one core of a common machine."""
 
 
@@ -286,8 +286,8 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
         layout, results = optimized.layout, optimized.results()
         # what has moved may have become a little longer than wanted
         layout = divide_long_blocks(layout, params)
-    layout = _with_net_floor(canonical(layout), params)
-    layout = choose_entries(layout, params)
+    # entries first: a street that ends at one is no cul-de-sac, and has another width
+    layout = _with_net_floor(choose_entries(canonical(layout), params), params)
     missed = (*findings(layout, params), *missed_dimensions(layout, params))
     return layout.replace(issues=(*layout.issues, *missed)), results
 
@@ -308,7 +308,7 @@ def _with_net_floor(layout: Layout, params: CogenerateParams) -> Layout:
     if not layout.street_rules.net_min_area:
         return layout
     floor = params.min_area or SMALL_NET_SHARE * float(_net_areas(layout).mean())
-    layout = canonical(keep_net_areas(layout, floor))
+    layout = set_remnants_aside(canonical(keep_net_areas(layout, floor)), floor)
     if params.min_area is None:
         net = _net_areas(layout)
         floor = float(net.min(initial=np.inf, where=(net >= floor) & ~layout.face_locked))

@@ -87,16 +87,8 @@ def parcel_issues(
 def _sizes(layout: Layout) -> list[Issue]:
     """Parts and blocks too small for a parcel, and parcels that stayed very large."""
     area, which = layout.mesh.face_area, ""
-    code, why = (
-        "block_below_min_area",
-        "given streets, locked land and the rim enclose it, and it stays one parcel.",
-    )
     if layout.street_rules.net_min_area:
         area, which = lay_out_rights_of_way(layout).net_area, " net"
-        code, why = (
-            "parcel_below_min_area",
-            "it cannot be joined with another without cutting off a street.",
-        )
     least = np.full(len(area), layout.min_area)
     most = VERY_LARGE * least
     small = (area < least * (1.0 - AREA_ROUNDING)) & ~layout.face_locked
@@ -113,9 +105,9 @@ def _sizes(layout: Layout) -> list[Issue]:
         ),
         *parcel_issues(
             layout,
-            code,
-            f"This parcel ({{value:.0f}} m²{which}) is smaller than the smallest allowed "
-            f"({{limit:.0f}} m²): {why}",
+            "block_below_min_area",
+            "What given streets, locked land and the rim enclose here ({value:.0f} m²) is smaller "
+            "than the smallest parcel allowed ({limit:.0f} m²) and stays one parcel.",
             small & ~whole,
             area,
             least,

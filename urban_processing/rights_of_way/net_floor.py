@@ -10,10 +10,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from urban_processing.access_rule import MEASURED_M, reached_frontage
-from urban_processing.layout import NOT_FIXED, EdgeKind, Layout
+from urban_processing.layout import NOT_FIXED, REMNANT_USE, EdgeKind, Layout
 from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.rights_of_way.lay_out import lay_out_rights_of_way
+from urban_processing.site import Issue
 from urban_processing.street_rules import StreetRules
 from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.recut import SIDES_COST, Pair, join_pairs, joinable_pairs
@@ -40,7 +41,8 @@ def keep_net_areas(layout: Layout, min_area: float) -> Layout:
     Each is joined with the neighbour with which it makes the best shape. A parcel that is a
     block of its own first loses one of the streets around it, one that leaves no new street
     end if there is one, and takes up those that had no other street. A part that ends as one
-    parcel keeps it, however small.
+    parcel keeps it, however small. What streets enclose that must stay is set aside by
+    `set_remnants_aside`.
     """
     while True:
         net = lay_out_rights_of_way(layout).net_area
@@ -53,6 +55,38 @@ def keep_net_areas(layout: Layout, min_area: float) -> Layout:
             layout = _opened(layout, net, small)
         if layout is before:
             return layout
+
+
+def set_remnants_aside(layout: Layout, min_area: float) -> Layout:
+    """Take parcels whose net area stays under `min_area` (m²) out of the building land.
+
+    They lie between streets that cannot be taken away. Each is locked, its land use is
+    `REMNANT_USE`, and it is listed.
+    """
+    net = lay_out_rights_of_way(layout).net_area
+    small = _too_small(layout, net, min_area)
+    if not small.any():
+        return layout
+    polygons = layout.mesh.face_polygons()
+    issues = [
+        Issue(
+            code="remnant",
+            message=f"This land ({net[f]:.0f} m² net) between streets that stay is smaller than "
+            f"the smallest parcel allowed ({min_area:.0f} m²): it is no building land.",
+            part=int(layout.face_part[f]),
+            parcel_id=f + 1,
+            value=float(net[f]),
+            limit=min_area,
+            geometry=polygons[f],
+        )
+        for f in np.flatnonzero(small).tolist()
+    ]
+    return layout.replace(
+        face_locked=layout.face_locked | small,
+        face_use=np.where(small, len(layout.land_uses), layout.face_use),
+        land_uses=(*layout.land_uses, REMNANT_USE),
+        issues=(*layout.issues, *issues),
+    )
 
 
 def _too_small(layout: Layout, net: FloatArray, min_area: float) -> BoolArray:
