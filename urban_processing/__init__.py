@@ -19,14 +19,15 @@ if TYPE_CHECKING:
     from urban_processing.api import cogenerate, optimize
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayout
-    from urban_processing.params.cogenerate import CogenerateParams, Preset, StreetPattern
+    from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
     from urban_processing.params.optimize import OptimizeParams
+    from urban_processing.params.rules import Preset
 
 _HOME = {
     "CogenerateParams": "urban_processing.params.cogenerate",
     "GeoLayout": "urban_processing.io.frames",
     "OptimizeParams": "urban_processing.params.optimize",
-    "Preset": "urban_processing.params.cogenerate",
+    "Preset": "urban_processing.params.rules",
     "StreetPattern": "urban_processing.params.cogenerate",
     "cogenerate": "urban_processing.api",
     "optimize": "urban_processing.api",

@@ -10,6 +10,7 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.planar import OUTSIDE, IntArray
 from urban_processing.metrics.parcels import measure_parcels
 from urban_processing.streets import network as net
+from urban_processing.streets.classes import NodeKind
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -117,7 +118,7 @@ def street_network(layout: Layout) -> nx.MultiGraph[int]:
 
     graph: nx.MultiGraph[int] = nx.MultiGraph()
     network, mesh = net.street_network(layout), layout.mesh
-    kinds = np.full(mesh.n_vertices, net.NodeKind.POINT)
+    kinds = np.full(mesh.n_vertices, NodeKind.POINT)
     kinds[network.node_vertex] = network.node_kind
     number = np.zeros(mesh.n_vertices, dtype=np.int64)
     number[network.node_vertex] = network.node_number
@@ -131,7 +132,7 @@ def street_network(layout: Layout) -> nx.MultiGraph[int]:
     vertices = np.unique(np.concatenate([tails, heads]))
     xy = _map_xy(layout, vertices)
     for i, v in enumerate(vertices.tolist()):
-        kind = net.NodeKind(int(kinds[v])).name.lower()
+        kind = NodeKind(int(kinds[v])).name.lower()
         junction = int(number[v]) or None
         graph.add_node(v, x=xy[i][0], y=xy[i][1], kind=kind, junction_id=junction)
     for i, k in enumerate(edge.tolist()):

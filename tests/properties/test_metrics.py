@@ -15,7 +15,8 @@ from urban_processing.metrics.certificate import certificate
 from urban_processing.metrics.measures import LayoutMeasures, measure
 from urban_processing.metrics.overlap import covered_share, find_overlaps, segments_of
 from urban_processing.site import Frame
-from urban_processing.streets.network import NodeKind, street_network
+from urban_processing.streets.classes import NodeKind
+from urban_processing.streets.network import street_network
 
 SIZE = 200.0
 SEEDS = st.integers(min_value=0, max_value=10_000)

@@ -18,7 +18,7 @@ from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
 from urban_processing.rights_of_way import RightsOfWay
 from urban_processing.rights_of_way.lay_out import CLASSES
 from urban_processing.schema import ColumnType, layer
-from urban_processing.streets.network import NodeKind
+from urban_processing.streets.classes import NodeKind
 
 NODE_KIND_NAMES = {NodeKind.JUNCTION: "junction", NodeKind.END: "end", NodeKind.ENTRY: "entry"}
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import enum
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from urban_processing.layout import EdgeKind, GivenStreet, Layout
+from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh, rank_cycles
 from urban_processing.mesh.straight import (
     STRAIGHT_DEG,
@@ -22,23 +18,17 @@ from urban_processing.mesh.straight import (
     included_angle,
     pairs_at_nodes,
 )
-from urban_processing.street_rules import StreetClass
+from urban_processing.streets.classes import (
+    NodeKind,
+    edge_classes,
+    edge_widths,
+    given_classes,
+)
 
 CHORD_M = 20.0
 """Longest chord over which the direction of a street at a junction is taken."""
 
 ComplexArray = npt.NDArray[np.complex128]
-
-
-class NodeKind(enum.IntEnum):
-    """What a node of the street network is (Chen 2024, section 3)."""
-
-    POINT = 0
-    """The arbitrary start of a ring that no other street meets."""
-    END = 1
-    JUNCTION = 2
-    ENTRY = 3
-    """Where the network meets the outside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,8 +228,8 @@ def street_network(layout: Layout) -> StreetNetwork:
     kind[layout.vertex_entry[node_vertex]] = NodeKind.ENTRY
     level = np.asarray(layout.edge_level[half_edges >> 1], dtype=np.int64)
     edge_level = np.minimum.reduceat(level, offsets[:-1]) if n_edges else level
-    classes = _classes(start, end, kind, degree, edge_rim, edge_level, edge_fixed >= 0)
-    classes = _given_classes(classes, layout.fixed_streets, edge_fixed)
+    classes = edge_classes(start, end, kind, degree, edge_rim, edge_level, edge_fixed >= 0)
+    classes = given_classes(classes, layout.fixed_streets, edge_fixed)
     pair_node, pair_arms, continues = _pair_arms(mesh, first, last, ends, kind)
     arm_points = _arm_points(mesh, half_edges, offsets, start == end)
     chord = _chords(mesh, arm_points)
@@ -258,8 +248,8 @@ def street_network(layout: Layout) -> StreetNetwork:
         edge_level=edge_level,
         edge_length=_lengths(mesh, half_edges, offsets),
         edge_class=classes,
-        edge_width=_widths(layout, classes, edge_fixed),
-        edge_street=_components(n_edges, pair_edges[same]),
+        edge_width=edge_widths(layout, classes, edge_fixed),
+        edge_street=components(n_edges, pair_edges[same]),
         node_vertex=node_vertex,
         node_part=node_part,
         node_degree=degree,
@@ -382,63 +372,6 @@ def _chords(mesh: PlanarMesh, points: ArmPoints) -> ComplexArray:
     z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
     before, after = z[points.before], z[points.after]
     return np.asarray(before + points.share * (after - before) - z[points.node])
-
-
-def _classes(
-    start: IntArray,
-    end: IntArray,
-    node_kind: IntArray,
-    node_degree: IntArray,
-    rim: BoolArray,
-    level: IntArray,
-    fixed: BoolArray,
-) -> npt.NDArray[np.str_]:
-    """(K,) class of each network edge, by the rule that `StreetNetwork` states."""
-    out = np.full(len(start), StreetClass.LOCAL.value, dtype="<U10")
-    levels = np.unique(level[~rim & ~fixed])
-    if len(levels):
-        out[level <= levels[(len(levels) - 1) // 2]] = StreetClass.COLLECTOR.value
-    # edges that follow one another at bends lead to the same places
-    edges, nodes = np.tile(np.arange(len(start)), 2), np.concatenate([start, end])
-    bend = np.flatnonzero((node_degree[nodes] == 2) & ~rim[edges])
-    bend = bend[np.argsort(nodes[bend], kind="stable")]
-    two = np.flatnonzero(nodes[bend[1:]] == nodes[bend[:-1]])
-    run = _components(len(start), edges[np.column_stack([bend[two], bend[two + 1]])])
-    at_end = (node_kind[start] == NodeKind.END) | (node_kind[end] == NodeKind.END)
-    out[np.isin(run, run[at_end])] = StreetClass.CUL_DE_SAC.value
-    out[rim] = StreetClass.RIM.value
-    return out
-
-
-def _given_classes(
-    classes: npt.NDArray[np.str_], given: Sequence[GivenStreet], fixed: IntArray
-) -> npt.NDArray[np.str_]:
-    """Put in the classes that the user gave, or else *fixed* on streets that are no rim."""
-    out = classes.tolist()
-    for k in np.flatnonzero(fixed >= 0).tolist():
-        plain = StreetClass.RIM if out[k] == StreetClass.RIM else StreetClass.FIXED
-        out[k] = given[fixed[k]].street_class or plain.value
-    return np.array(out, dtype=np.str_)
-
-
-def _widths(layout: Layout, classes: npt.NDArray[np.str_], fixed: IntArray) -> FloatArray:
-    """(K,) width that the user gave a street, else that of its class, or of a fixed street."""
-    nominal = layout.street_rules.width_m
-    width = [nominal.get(c, nominal[StreetClass.FIXED]) for c in classes.tolist()]
-    own = np.array([math.nan, *(street.width for street in layout.fixed_streets)])[fixed + 1]
-    return np.where(np.isnan(own), width, own)
-
-
-def _components(n: int, pairs: IntArray) -> IntArray:
-    """(n,) component of each of n things joined by pairs, numbered by their lowest member."""
-    if n == 0:
-        return np.empty(0, dtype=np.int64)
-    ones = np.ones(len(pairs), dtype=np.int8)
-    _, label = connected_components(
-        coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(n, n)), directed=False
-    )
-    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[inverse]
 
 
 def _lengths(mesh: PlanarMesh, half_edges: IntArray, offsets: IntArray) -> FloatArray:
