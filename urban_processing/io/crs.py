@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pyproj
 from pyproj.crs import GeographicCRS
@@ -55,9 +57,14 @@ class Pyproj:
         """Transform (n, 2) coordinates, x before y; what has no image becomes infinite."""
         if source == target:
             return xy
-        transformer = pyproj.Transformer.from_crs(source, target, always_xy=True)
-        x, y = transformer.transform(xy[:, 0], xy[:, 1])
+        x, y = _transformer(source, target).transform(xy[:, 0], xy[:, 1])
         return np.column_stack([x, y])
+
+
+@lru_cache(maxsize=16)
+def _transformer(source: pyproj.CRS, target: pyproj.CRS) -> pyproj.Transformer:
+    """Return a transformer, which takes much longer to make than to use."""
+    return pyproj.Transformer.from_crs(source, target, always_xy=True)
 
 
 PYPROJ = Pyproj()
