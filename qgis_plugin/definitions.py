@@ -110,12 +110,24 @@ def input_of(spec: AlgorithmSpec, kind: InputKind) -> Input | None:
 
 
 def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinition]:
-    """Yield everything that is asked for: inputs, parameters, sinks, files."""
-    for item in spec.inputs:
-        yield _input(item)
+    """Yield everything that is asked for: inputs, parameters, sinks, files.
+
+    Inputs that may be left out come after the first panel of parameters where another input is
+    required, so that what must be given stands together at the top.
+    """
     fields = [field for panel in spec.panels().values() for field in panel]
-    for field in fields:
-        if not field.param.advanced:
+    plain = [field for field in fields if not field.param.advanced]
+    needed = [item for item in spec.inputs if item.required]
+    first = [field for field in plain if needed and field.param.group == plain[0].param.group]
+    for item in needed:
+        yield _input(item)
+    for field in first:
+        yield _parameter(field)
+    for item in spec.inputs:
+        if not item.required:
+            yield _input(item)
+    for field in plain:
+        if field not in first:
             yield _parameter(field)
     if input_of(spec, InputKind.BOUNDARY):
         crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)

@@ -140,6 +140,16 @@ def test_inputs_are_layers_of_the_right_kind(algorithm: Any, spec: AlgorithmSpec
             assert asked.dataTypes() == [INPUTS[item.kind]]
 
 
+def test_what_must_be_given_stands_at_the_top(provider: Any) -> None:
+    cogenerate = QgsApplication.processingRegistry().algorithmById("urban_processing:cogenerate")
+    names = [d.name() for d in cogenerate.parameterDefinitions()]
+    assert names[:3] == ["BOUNDARY", "MIN_AREA", "PARCELS"]
+    assert names.index("CORNERS") < names.index("PATTERN")
+    optimize = QgsApplication.processingRegistry().algorithmById("urban_processing:optimize")
+    names = [d.name() for d in optimize.parameterDefinitions()]
+    assert names[:3] == ["LAYOUT", "PARCEL_LAYER", "STREET_LAYER"]
+
+
 def test_results_are_sinks_and_files_and_all_optional(algorithm: Any) -> None:
     made = {d.name(): d for d in algorithm.destinationParameterDefinitions()}
     optional = QgsProcessingParameterDefinition.Flag.FlagOptional
