@@ -7,16 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from urban_processing.errors import BoundaryError
 from urban_processing.land import land_corners
 from urban_processing.layout import NOT_FIXED, EdgeKind, Layout, layout_from_mesh
-from urban_processing.mesh.build import mesh_from_polygons
+from urban_processing.mesh.build import canonical_rings, mesh_from_polygons
+from urban_processing.mesh.components import components
 from urban_processing.mesh.coverage import Coverage, fit_together
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
-from urban_processing.rebuild import canonical_rings
+from urban_processing.mesh.places import are_near, line_segments
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, IntArray, PlanarMesh
 from urban_processing.site import Frame, Issue
 
 ObjectArray = npt.NDArray[np.object_]
@@ -112,9 +111,7 @@ def _parts(mesh: PlanarMesh) -> IntArray:
     """(F,) part of a face: faces that share edges, the largest part first."""
     sides = mesh.face.reshape(-1, 2)
     a, b = sides[(sides != OUTSIDE).all(axis=1)].T
-    n = mesh.n_faces
-    ones = np.ones(len(a), dtype=np.int8)
-    _, label = connected_components(coo_array((ones, (a, b)), shape=(n, n)), directed=False)
+    label = components(mesh.n_faces, np.column_stack([a, b]))
     area = np.bincount(label, weights=mesh.face_area)
     rank = np.empty(len(area), dtype=np.int64)
     rank[np.lexsort((np.arange(len(area)), -area))] = np.arange(len(area))
@@ -126,25 +123,11 @@ def _on_lines(mesh: PlanarMesh, lines: ObjectArray, snap: float) -> BoolArray:
     if len(lines) == 0:
         return np.zeros(mesh.n_edges, dtype=bool)
     a, b = (mesh.xy[mesh.origin[side::2]] for side in (0, 1))
-    near = [_near(a + share * (b - a), lines, 2 * snap) for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    segments = shapely.linestrings(line_segments(lines)[0])
+    near = [
+        are_near(a + share * (b - a), segments, 2 * snap) for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+    ]
     return np.asarray(np.all(near, axis=0))
-
-
-def _near(xy: FloatArray, lines: ObjectArray, distance: float) -> BoolArray:
-    """(n,) which places lie within some metres of one of the lines."""
-    at, _ = shapely.STRtree(_segments(lines)).query(
-        shapely.points(xy), predicate="dwithin", distance=distance
-    )
-    out = np.zeros(len(xy), dtype=bool)
-    out[at] = True
-    return out
-
-
-def _segments(lines: ObjectArray) -> ObjectArray:
-    """Lines as single straight segments."""
-    xy, line = shapely.get_coordinates(lines, return_index=True)
-    same = line[1:] == line[:-1]
-    return np.asarray(shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[same]), dtype=object)
 
 
 def _fit_issues(coverage: Coverage, parcels: ObjectArray) -> list[Issue]:
@@ -191,7 +174,7 @@ def _stray_streets(layout: Layout, streets: ObjectArray, snap: float) -> list[Is
     total = float(shapely.length(streets).sum())
     step = max(LOOKED_AT_M, total / LOOKED_AT)
     xy = shapely.get_coordinates(shapely.segmentize(streets, step))
-    stray = ~_near(xy, edges, 4 * snap) if len(edges) else np.ones(len(xy), dtype=bool)
+    stray = ~are_near(xy, edges, 4 * snap) if len(edges) else np.ones(len(xy), dtype=bool)
     length = total * float(stray.mean())
     if length <= step:
         return []

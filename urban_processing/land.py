@@ -10,6 +10,12 @@ import numpy as np
 import shapely
 
 from urban_processing.constraints.ground import Ground
+from urban_processing.constraints.narrows import (
+    HAIR,
+    MITRE_LIMIT,
+    NARROW_AREA,
+    there_and_back,
+)
 from urban_processing.constraints.rim import edges_along
 from urban_processing.errors import BoundaryError, TopologyError
 from urban_processing.layout import EdgeKind, GivenStreet, Layout, layout_from_mesh
@@ -20,7 +26,7 @@ from urban_processing.mesh.corners import (
     reported_polygons,
     sharpest_vertex,
 )
-from urban_processing.mesh.places import edges_at, vertices_at
+from urban_processing.mesh.places import edges_at, nearest_on_ring, vertices_at
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
@@ -30,13 +36,6 @@ smaller than a parcel make parcels that nobody wants."""
 
 MOVED_SHARE = 0.05
 """Simplification may move this share of a part's area; strips and small parts need less."""
-
-MITRE_LIMIT = 5.0
-NARROW_AREA = 0.2
-"""Inlets and spurs smaller than this many squared tolerances are left to the simplification."""
-
-HAIR = 1e-3
-"""Widening of what is filled or cut off, in tolerances."""
 
 FINE_SHARE = 0.1
 """What is finer than this share of the tolerance is left out before narrows are sought, and a
@@ -132,18 +131,14 @@ def _with_vertex(
 ) -> tuple[shapely.Polygon, FloatArray, float]:
     """The part with a vertex where its rim is nearest to a point; that vertex; how far it was."""
     ring = shapely.get_coordinates(part.exterior)
-    a, edge = ring[:-1], np.diff(ring, axis=0)
-    along = np.clip(((point - a) * edge).sum(axis=1) / (edge**2).sum(axis=1), 0.0, 1.0)
-    foot = a + along[:, None] * edge
-    off = np.hypot(*(foot - point).T)
-    k = int(np.argmin(off))
-    to_vertex = np.hypot(*(a - foot[k]).T)
+    k, foot, off = nearest_on_ring(ring, point)
+    to_vertex = np.hypot(*(ring[:-1] - foot).T)
     vertex = int(np.argmin(to_vertex))
     if to_vertex[vertex] <= near:
-        return part, a[vertex], float(off[k])
-    place = snap_to_grid(foot[k])
+        return part, ring[vertex], off
+    place = snap_to_grid(foot)
     shell = np.insert(ring, k + 1, place, axis=0)
-    return shapely.Polygon(shell, part.interiors), place, float(off[k])
+    return shapely.Polygon(shell, part.interiors), place, off
 
 
 def _at_corners(xy: FloatArray, corners: FloatArray) -> BoolArray:
@@ -228,9 +223,7 @@ def _without_narrows(part: shapely.Polygon, width: float, corners: FloatArray) -
     """
     fixed = shapely.MultiPoint(corners)
     for sign in (1.0, -1.0):
-        reach = 0.5 * width * sign
-        there = part.buffer(reach, join_style="mitre", mitre_limit=MITRE_LIMIT)
-        back = there.buffer(-reach, join_style="mitre", mitre_limit=MITRE_LIMIT)
+        back = there_and_back(part, 0.5 * width * sign)
         changes = back.difference(part) if sign > 0 else part.difference(back)
         narrow = [
             piece

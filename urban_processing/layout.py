@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from urban_processing.hashing import splitmix64
+from urban_processing.mesh.components import components
 from urban_processing.mesh.corner_graph import CornerGraph, build_corner_graph
 from urban_processing.mesh.edit import Remap
+from urban_processing.mesh.places import are_near
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.site import Frame, Issue
 from urban_processing.street_rules import StreetRules
@@ -225,9 +225,12 @@ class Layout:
         sides = self.mesh.face.reshape(-1, 2)
         joined = ~self.edge_street & (sides != OUTSIDE).all(axis=1)
         a, b = sides[joined].T
-        n = self.mesh.n_faces
-        graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n))
-        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+        return components(self.mesh.n_faces, np.column_stack([a, b]))
+
+    @cached_property
+    def face_alone(self) -> BoolArray:
+        """(F,) parcels that are a whole part of the land each."""
+        return np.asarray(np.bincount(self.face_part)[self.face_part] == 1)
 
     @cached_property
     def rim_parcel(self) -> BoolArray:
@@ -288,19 +291,9 @@ def edge_kinds(mesh: PlanarMesh, obstacles: Sequence[shapely.Polygon] = ()) -> n
         outer = np.flatnonzero(kind != EdgeKind.INTERIOR)
         ends = mesh.xy[mesh.origin.reshape(-1, 2)[outer]]
         places = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1)
-        kind[outer[_lie_on(places, obstacles)]] = EdgeKind.OBSTACLE
+        near = are_near(places.reshape(-1, 2), obstacles, ON_OBSTACLE).reshape(-1, 3)
+        kind[outer[near.all(axis=1)]] = EdgeKind.OBSTACLE
     return kind
-
-
-def _lie_on(places: FloatArray, obstacles: Sequence[shapely.Polygon]) -> BoolArray:
-    """(n,) whether all of (n, 3, 2) places lie at one of the obstacles."""
-    tree = shapely.STRtree(list(obstacles))
-    at, _ = tree.query(
-        shapely.points(places.reshape(-1, 2)), predicate="dwithin", distance=ON_OBSTACLE
-    )
-    near = np.zeros(len(places) * 3, dtype=bool)
-    near[at] = True
-    return np.asarray(near.reshape(-1, 3).all(axis=1))
 
 
 def _child_lineage(parent: npt.NDArray[np.uint64], parent_face: IntArray) -> npt.NDArray[np.uint64]:

@@ -10,7 +10,7 @@ import shapely
 
 from urban_processing.errors import TopologyError
 from urban_processing.layout import NOT_FIXED, PARCEL_USE, GivenStreet, Layout, edge_kinds
-from urban_processing.mesh.build import mesh_from_polygons
+from urban_processing.mesh.build import canonical_rings, mesh_from_polygons
 from urban_processing.mesh.places import edges_at, vertices_at
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.site import Frame, Issue
@@ -146,8 +146,3 @@ def rebuild_layout(
         fixed_streets=parts.fixed_streets,
         land_uses=parts.land_uses,
     )
-
-
-def canonical_rings(polygons: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
-    """Start every ring at its lowest vertex; shells counter-clockwise."""
-    return np.asarray(shapely.orient_polygons(shapely.normalize(polygons)), dtype=object)

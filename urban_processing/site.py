@@ -13,6 +13,9 @@ GRID = 2.0**-20
 """Spacing in metres of the grid that all coordinates are kept on, relative to a whole-metre
 origin, so that shifting to map coordinates and back loses nothing."""
 
+AREA_ROUNDING = 1e-9
+"""Share by which rounding may take an area below the smallest one allowed."""
+
 FloatArray = npt.NDArray[np.float64]
 
 

@@ -11,6 +11,7 @@ import shapely
 from urban_processing.constraints.leads import lead_on
 from urban_processing.constraints.lines import ready_streets
 from urban_processing.constraints.linework import node_lines
+from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import GRID, Issue, Site, snap_to_grid
 
@@ -55,12 +56,13 @@ def divide_land(site: Site, *, min_area: float, snap: float) -> Ground:
         empty = np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)
         return Ground(site.parts, np.arange(n), none, *empty, tuple(locked_issues))
     land = shapely.union_all(list(site.parts))
-    closed = shapely.union_all([q for p in locked.values() for q in p.polygons])
+    closed_polygons = [q for p in locked.values() for q in p]
+    closed = shapely.union_all(closed_polygons)
     ground = shapely.difference(land, closed, grid_size=GRID)
     pieces, issues = ready_streets(site.fixed_streets, ground, snap=snap)
     outer = [part.exterior for part in site.parts]
     inner = [ring for part in site.parts for ring in part.interiors]
-    inner += list(shapely.get_rings([q for p in locked.values() for q in p.polygons]))
+    inner += list(shapely.get_rings(closed_polygons))
     work = node_lines(outer, inner, pieces)
     work.clip(ground)
     holes = sum(shapely.Polygon(ring).area for ring in inner)
@@ -78,20 +80,13 @@ def divide_land(site: Site, *, min_area: float, snap: float) -> Ground:
     )
 
 
-@dataclass(frozen=True)
-class _Locked:
-    """What is left of a locked polygon in the land."""
-
-    polygons: tuple[shapely.Polygon, ...]
-
-
-def _locked_on(site: Site, snap: float) -> tuple[dict[int, _Locked], list[Issue]]:
+def _locked_on(site: Site, snap: float) -> tuple[dict[int, list[shapely.Polygon]], list[Issue]]:
     """Locked land within the land, by its number; what lies outside is cut off."""
     if not site.locked:
         return {}, []
     land = shapely.union_all(list(site.parts))
     rim = land.boundary
-    out: dict[int, _Locked] = {}
+    out: dict[int, list[shapely.Polygon]] = {}
     lost = 0.0
     for k, given in enumerate(site.locked):
         near = shapely.make_valid(
@@ -105,7 +100,7 @@ def _locked_on(site: Site, snap: float) -> tuple[dict[int, _Locked], list[Issue]
         ]
         lost += max(given.polygon.area - sum(p.area for p in kept), 0.0)
         if kept:
-            out[k] = _Locked(tuple(kept))
+            out[k] = kept
     if lost <= snap * snap:
         return out, []
     gone = len(site.locked) - len(out)
@@ -121,16 +116,16 @@ def _locked_on(site: Site, snap: float) -> tuple[dict[int, _Locked], list[Issue]
 def _faces(
     polygons: Sequence[shapely.Polygon],
     parts: Sequence[shapely.Polygon],
-    locked: dict[int, _Locked],
+    locked: dict[int, list[shapely.Polygon]],
 ) -> tuple[list[shapely.Polygon], IntArray, IntArray]:
     """Faces in the land, by part and size; the part and the locked land of each."""
-    turned = shapely.orient_polygons(shapely.normalize(np.array(polygons, dtype=object)))
+    turned = canonical_rings(np.array(polygons, dtype=object))
     faces = np.array([shapely.transform(p, snap_to_grid) for p in turned], dtype=object)
     place = shapely.point_on_surface(faces)
     face, part = shapely.STRtree(list(parts)).query(place, predicate="within")
     which = np.full(len(faces), -1)
-    owner = [k for k, each in locked.items() for _ in each.polygons]
-    inside, number = shapely.STRtree([q for each in locked.values() for q in each.polygons]).query(
+    owner = [k for k, each in locked.items() for _ in each]
+    inside, number = shapely.STRtree([q for each in locked.values() for q in each]).query(
         place, predicate="within"
     )
     which[inside] = np.array(owner, dtype=np.int64)[number]

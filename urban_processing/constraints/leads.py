@@ -17,7 +17,7 @@ import shapely
 from urban_processing.constraints.blocks import Blocks
 from urban_processing.constraints.linework import ON, Linework
 from urban_processing.mesh.planar import BoolArray
-from urban_processing.site import GRID, Issue
+from urban_processing.site import AREA_ROUNDING, GRID, Issue
 
 ANGLES = (0, 15, -15, 30, -30, 45, -45, 60, -60, 75, -75, 90, -90, 105, -105, 120, -120)
 """Directions in degrees, from straight on, in which an end may be prolonged."""
@@ -31,9 +31,6 @@ LEAST_ANGLE = math.radians(5.0)
 
 AROUND = 8
 """Number of points of a ring of streets from which it is tied to what is around it."""
-
-AREA_ROUNDING = 1e-9
-"""Share of the smallest area that may be lost to rounding."""
 
 ComplexArray = npt.NDArray[np.complex128]
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.constraints.lines import Piece
+from urban_processing.mesh.places import segments_on
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import GRID, Issue
 
@@ -182,14 +183,14 @@ def node_lines(
     here = np.flatnonzero((line[1:] == line[:-1]) & (z[1:] != z[:-1]))
     places, index = np.unique(np.concatenate([z[here], z[here + 1]]), return_inverse=True)
     pairs = np.unique(np.sort(index.reshape(2, -1).T, axis=1), axis=0)
-    ends = places[pairs]
+    segments = np.stack([places[pairs].real, places[pairs].imag], axis=-1)
     street = np.full(len(pairs), -1)
-    which, edge = _on_lines(lines, ends)
+    which, edge = segments_on(segments, lines, ON)
     order = np.lexsort((-which, edge))
     street[edge[order]] = np.array([p.street for p in pieces], dtype=np.int64)[which[order]]
-    is_root, is_inner = (
-        np.isin(np.arange(len(pairs)), _on_lines(rings, ends)[1]) for rings in (outer, inner)
-    )
+    is_root, is_inner = np.zeros((2, len(pairs)), dtype=bool)
+    is_root[segments_on(segments, outer, ON)[1]] = True
+    is_inner[segments_on(segments, inner, ON)[1]] = True
     return Linework(
         z=places.tolist(),
         ends=[(int(a), int(b)) for a, b in pairs],
@@ -197,19 +198,3 @@ def node_lines(
         firm=(is_root | is_inner).tolist(),
         root=is_root.tolist(),
     )
-
-
-def _on_lines(lines: Sequence[shapely.Geometry], ends: np.ndarray) -> tuple[IntArray, IntArray]:
-    """Pairs of a line and a segment that lies on it; ends are (n, 2) complex."""
-    none = np.empty(0, dtype=np.int64)
-    if not len(lines):
-        return none, none
-    tree = shapely.STRtree([shapely.LineString(g) for g in lines])
-    found = []
-    for place in (ends[:, 0], ends.mean(axis=1), ends[:, 1]):
-        points = shapely.points(place.real, place.imag)
-        segment, line = tree.query(points, predicate="dwithin", distance=ON)
-        found.append(set(zip(line.tolist(), segment.tolist(), strict=True)))
-    both = sorted(set.intersection(*found))
-    pairs = np.array(both, dtype=np.int64).reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1]

@@ -8,15 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
+from urban_processing.constraints.narrows import HAIR, NARROW_AREA, there_and_back
 from urban_processing.errors import BoundaryError
+from urban_processing.mesh.build import canonical_rings
 from urban_processing.site import GRID, Issue, Site, snap_to_grid
-
-MITRE_LIMIT = 5.0
-NARROW_AREA = 0.2
-"""Narrow pieces of land at obstacles that are smaller than this many squared widths stay."""
-
-HAIR = 1e-3
-"""Widening of what is taken off, in widths, so that no slits stay."""
 
 LISTED_M2 = 1.0
 """Obstacles that lie outside the land, or grow, by less than this many m² are not told of."""
@@ -96,7 +91,7 @@ def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
 
 def _canonical(polygons: Sequence[shapely.Polygon]) -> list[shapely.Polygon]:
     """Rings that start and run the same however a polygon came about."""
-    turned = shapely.orient_polygons(shapely.normalize(np.array(polygons, dtype=object)))
+    turned = canonical_rings(np.array(polygons, dtype=object))
     return sorted(
         (shapely.transform(p, snap_to_grid) for p in turned), key=lambda p: (p.bounds, p.wkb)
     )
@@ -112,8 +107,7 @@ def _without_narrows(
     """Take away what is narrower than `width` at obstacles; the part may fall apart."""
     if width <= 0 or not shapely.dwithin(part, obstacles, GRID):
         return [part]
-    style = {"join_style": "mitre", "mitre_limit": MITRE_LIMIT}
-    core = shapely.buffer(shapely.buffer(part, -0.5 * width, **style), 0.5 * width, **style)
+    core = there_and_back(part, -0.5 * width)
     # buffers with mitres may come out invalid
     core = shapely.make_valid(core, method="structure", keep_collapsed=False)
     narrow = [

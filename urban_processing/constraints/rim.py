@@ -10,7 +10,8 @@ import shapely
 
 from urban_processing.errors import BoundaryError
 from urban_processing.layout import ON_OBSTACLE, EdgeKind
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh
+from urban_processing.mesh.places import nearest_on_ring, segments_on
+from urban_processing.mesh.planar import BoolArray, FloatArray, PlanarMesh
 from urban_processing.site import Site, snap_to_grid
 
 
@@ -80,11 +81,8 @@ def _placed(
         part = int(np.argmin(shapely.distance([p.exterior for p in parts], here)))
     polygon = parts[part]
     ring = shapely.get_coordinates(polygon.exterior)
-    a, edge = ring[:-1], np.diff(ring, axis=0)
-    along = np.clip(((xy - a) * edge).sum(axis=1) / (edge**2).sum(axis=1), 0.0, 1.0)
-    foot = a + along[:, None] * edge
-    k = int(np.argmin(np.hypot(*(foot - xy).T)))
-    place = snap_to_grid(foot[k])
+    k, foot, _ = nearest_on_ring(ring, xy)
+    place = snap_to_grid(foot)
     for vertex in (ring[k], ring[k + 1]):
         if np.hypot(*(vertex - place)) <= ON_OBSTACLE:
             return part, np.asarray(vertex)
@@ -125,15 +123,7 @@ def edges_along(mesh: PlanarMesh, kind: np.ndarray, lines: list[shapely.LineStri
     """(E,) which edges of the rim lie on one of some lines."""
     out = np.zeros(mesh.n_edges, dtype=bool)
     rim = np.flatnonzero(kind == EdgeKind.RIM)
-    if not lines or not len(rim):
-        return out
-    ends = mesh.xy[mesh.origin.reshape(-1, 2)[rim]]
-    tree = shapely.STRtree(lines)
-    hits = []
-    for places in (ends[:, 0], ends.mean(axis=1), ends[:, 1]):
-        edge, line = tree.query(shapely.points(places), predicate="dwithin", distance=ON_OBSTACLE)
-        hits.append(set(zip(edge.tolist(), line.tolist(), strict=True)))
-    on: IntArray = np.array(sorted({e for e, _ in set.intersection(*hits)}), dtype=np.int64)
+    _, on = segments_on(mesh.xy[mesh.origin.reshape(-1, 2)[rim]], lines, ON_OBSTACLE)
     out[rim[on]] = True
     return out
 

@@ -17,6 +17,7 @@ from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
 from urban_processing.intake.polygons import Note, clean_each, clean_polygons
 from urban_processing.intake.projection import Projection
+from urban_processing.mesh.build import canonical_rings
 from urban_processing.site import (
     GRID,
     FixedStreet,
@@ -194,13 +195,15 @@ class _Local(Generic[C]):
     def rim_lines(self, features: Features[C] | None, site: Site) -> list[shapely.LineString]:
         """Lines along the rim, checked to lie near it."""
         lines = [line for _, line in self._lines(features, "Rim lines")]
+        rim = _rim(site)
         for i, line in enumerate(lines):
             ends = shapely.get_coordinates(line)[[0, len(line.coords) // 2, -1]]
-            self._check_near("Rim line", i, shapely.MultiPoint(ends), site)
+            self._check_near("Rim line", i, shapely.MultiPoint(ends), site, rim)
         return lines
 
-    def _check_near(self, name: str, i: int, places: shapely.Geometry, site: Site) -> None:
-        rim = shapely.union_all([p.exterior for p in site.parts])
+    def _check_near(
+        self, name: str, i: int, places: shapely.Geometry, site: Site, rim: shapely.Geometry
+    ) -> None:
         reach = RIM_REACH * site.area**0.5
         distance = float(shapely.distance(shapely.get_parts(places), rim).max())
         if not distance <= reach:
@@ -219,8 +222,9 @@ class _Local(Generic[C]):
         except BoundaryError as error:
             self.problems += [f"Entries: {problem}" for problem in error.problems]
             return np.empty((0, 2))
+        rim = _rim(site)
         for i, point in enumerate(local):
-            self._check_near("Entry", i, point, site)
+            self._check_near("Entry", i, point, site, rim)
         return np.asarray(shapely.get_coordinates(local))
 
     def obstacles(self, features: Features[C] | None) -> list[shapely.Polygon]:
@@ -266,10 +270,14 @@ class _Local(Generic[C]):
         self.issues += [Issue(n.code, f"Of the {what}: {n.message}", value=n.value) for n in notes]
 
 
+def _rim(site: Site) -> shapely.Geometry:
+    return shapely.union_all([p.exterior for p in site.parts])
+
+
 def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     """Polygons of any geometry, in the order of their coordinates."""
     parts = [p for p in _flat([geometry]) if p.geom_type == "Polygon" and p.area > 0]
-    canonical = shapely.orient_polygons(shapely.normalize(np.array(parts, dtype=object)))
+    canonical = canonical_rings(np.array(parts, dtype=object))
     return sorted(canonical, key=lambda p: (p.bounds, p.wkb))
 
 

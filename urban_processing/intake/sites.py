@@ -16,6 +16,7 @@ from urban_processing.intake.features import Features
 from urban_processing.intake.given import GivenLayers
 from urban_processing.intake.polygons import Cleaned, clean_polygons
 from urban_processing.intake.projection import Projection
+from urban_processing.mesh.build import canonical_rings
 from urban_processing.site import GRID, FloatArray, Frame, Issue, Site, snap_to_grid
 
 C = TypeVar("C")
@@ -209,7 +210,7 @@ def _sorted_parts(polygons: list[shapely.Polygon]) -> tuple[shapely.Polygon, ...
     """Largest first, ties by coordinates; canonical start of every ring."""
     canonical = [
         shapely.transform(p, snap_to_grid)
-        for p in shapely.orient_polygons(shapely.normalize(np.array(polygons, dtype=object)))
+        for p in canonical_rings(np.array(polygons, dtype=object))
     ]
     return tuple(sorted(canonical, key=lambda p: (-p.area, p.bounds, p.wkb)))
 

@@ -21,7 +21,7 @@ from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
 from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Step
 from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
-from urban_processing.mesh.places import vertices_at
+from urban_processing.mesh.places import line_segments, vertices_at
 from urban_processing.metrics.tables import Table, layout_tables
 from urban_processing.paths import geopackage_problems
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
@@ -303,7 +303,7 @@ def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
     polygons, parcel = file.layer(PARCELS.name, *columns)
     order = np.argsort(parcel["parcel_id"], kind="stable")
     lines, street = file.layer(STREETS.name, "level", "fixed_id")
-    segments, line = _segments(lines)
+    segments, line = line_segments(lines)
     lineage = [int(text, 16) for text in parcel["lineage"]]
     uses = list(state["land_uses"])
     uses += sorted(set(parcel["land_use"].tolist()) - set(uses))
@@ -328,14 +328,6 @@ def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
 
 def _places(xy: Any) -> FloatArray:
     return np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-
-
-def _segments(lines: npt.NDArray[np.object_]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Split lines at their vertices: (S, 2, 2) ends, and (S,) the line of each."""
-    xy, line = shapely.get_coordinates(lines, return_index=True)
-    same = line[1:] == line[:-1]
-    segments = np.stack([xy[:-1], xy[1:]], axis=1)[same]
-    return segments, line[1:][same]
 
 
 def _read_issues(file: _File) -> tuple[Issue, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import TopologyError
@@ -36,6 +37,11 @@ def mesh_from_polygons(polygons: Sequence[shapely.Polygon]) -> PlanarMesh:
     return _pair_half_edges(
         vertices, origin, origin[following], following, ring_face[ring_of], len(oriented)
     )
+
+
+def canonical_rings(polygons: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+    """Start every ring at its lowest vertex; shells counter-clockwise."""
+    return np.asarray(shapely.orient_polygons(shapely.normalize(polygons)), dtype=object)
 
 
 def _ring_vertices(rings: object) -> tuple[FloatArray, IntArray, IntArray]:

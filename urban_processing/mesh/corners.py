@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, PlanarMesh
+from urban_processing.mesh.straight import STRAIGHT_DEG
 
-STRAIGHT_ANGLE = np.radians(135.0)
+STRAIGHT_ANGLE = np.radians(STRAIGHT_DEG)
 """Two edges whose included angle is larger count as collinear (Chen 2024, section 3)."""
 
 SIMPLIFY_SHARE = 0.02
@@ -91,6 +92,14 @@ def reported_polygons(xy: FloatArray, offsets: IntArray) -> tuple[IntArray, IntA
     """
     kept = simplified_vertices(xy, offsets, SIMPLIFY_SHARE)
     return thin_corners(xy, kept, np.searchsorted(kept, offsets))
+
+
+def reported_corners(mesh: PlanarMesh) -> tuple[IntArray, IntArray]:
+    """Corners of the `reported_polygons` of all faces, as ragged vertices of the mesh."""
+    half_edges, offsets = mesh.face_rings()
+    vertex = mesh.origin[half_edges]
+    corners, corner_offsets = reported_polygons(mesh.xy[vertex], offsets)
+    return vertex[corners], corner_offsets
 
 
 def thin_corners(

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from urban_processing.mesh.components import components
+from urban_processing.mesh.places import lower_end_first
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import GRID, snap_to_grid
 
@@ -83,7 +83,7 @@ def _snapped_edges(polygons: ObjectArray, extra: FloatArray, tolerance: float) -
     same = ring[1:] == ring[:-1]
     a, b = xy[:-1][same], xy[1:][same]
     long = (a != b).any(axis=1)
-    segments = np.unique(_lower_first(np.stack([a[long], b[long]], axis=1)), axis=0)
+    segments = np.unique(lower_end_first(np.stack([a[long], b[long]], axis=1)), axis=0)
     corners = np.unique(np.concatenate([xy, extra]), axis=0)
     return _through(segments, corners, tolerance)
 
@@ -92,11 +92,8 @@ def _merged(xy: FloatArray, tolerance: float) -> FloatArray:
     """The places, those within `tolerance` of each other in one: where most of them are."""
     places, inverse, count = np.unique(xy, axis=0, return_inverse=True, return_counts=True)
     pairs = cKDTree(places).query_pairs(tolerance, output_type="ndarray")
-    n = len(places)
-    ones = np.ones(len(pairs), dtype=np.int8)
-    joined = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    _, group = connected_components(joined, directed=False)
-    order = np.lexsort((np.arange(n), -count, group))
+    group = components(len(places), pairs)
+    order = np.lexsort((np.arange(len(places)), -count, group))
     chosen = order[np.flatnonzero(np.diff(group[order], prepend=-1))]
     return np.asarray(places[chosen][group][inverse.ravel()])
 
@@ -119,14 +116,7 @@ def _through(segments: FloatArray, corners: FloatArray, tolerance: float) -> Flo
     order = np.lexsort((at, of))
     xy, of = xy[order], of[order]
     same = (of[1:] == of[:-1]) & (xy[1:] != xy[:-1]).any(axis=1)
-    return np.unique(_lower_first(np.stack([xy[:-1], xy[1:]], axis=1)[same]), axis=0)
-
-
-def _lower_first(segments: FloatArray) -> FloatArray:
-    """The segments, each from its lower end."""
-    a, b = segments[:, 0], segments[:, 1]
-    swap = (a[:, 0] > b[:, 0]) | ((a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1]))
-    return np.where(swap[:, None, None], segments[:, ::-1], segments) + 0.0
+    return np.unique(lower_end_first(np.stack([xy[:-1], xy[1:]], axis=1)[same]), axis=0)
 
 
 def _united(pieces: ObjectArray, owner: IntArray) -> tuple[ObjectArray, IntArray]:

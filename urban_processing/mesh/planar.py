@@ -149,6 +149,12 @@ class PlanarMesh:
         np.add.at(out, self.loops.face[inside], self.loop_area[inside])
         return out
 
+    def vertices_of(self, edges: BoolArray) -> BoolArray:
+        """(V,) vertices of the chosen edges, (E,)."""
+        out = np.zeros(self.n_vertices, dtype=bool)
+        out[self.origin[np.repeat(edges, 2)]] = True
+        return out
+
     def face_half_edges(self, face: int) -> IntArray:
         """Half-edges around the (outer) loop of a face."""
         return self.loops.ring(int(self.face_loop[face]))

@@ -30,16 +30,13 @@ from urban_processing.metrics.tables import (
     street_table,
 )
 from urban_processing.rights_of_way import lay_out_rights_of_way
-from urban_processing.site import GRID
+from urban_processing.site import AREA_ROUNDING, GRID
 
 PARTITION_LIMIT = 1e-8
 """Largest symmetric difference of parcels and land, as a share of the land's area."""
 
 SNAP_M = 1e-6
 """Coordinates closer than this, in metres, are the same place."""
-
-AREA_ROUNDING = 1e-9
-"""Share of the smallest allowed area that may be lost to rounding."""
 
 
 @dataclass(frozen=True)

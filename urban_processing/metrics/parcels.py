@@ -94,22 +94,17 @@ class ParcelMeasures:
 
 def measure_parcels(layout: Layout) -> ParcelMeasures:
     """Measure every parcel of a layout; nothing is looped over in Python."""
-    mesh = layout.mesh
-    half_edges, offsets = mesh.face_rings()
-    xy = mesh.xy[mesh.origin[half_edges]]
-    corners, corner_offsets = reported_polygons(xy, offsets)
-    corner_xy = xy[corners]
+    mesh, ring = layout.mesh, _sides(layout)
+    corner_xy, corner_offsets = ring.corner_xy, ring.corner_offsets
     angle = np.degrees(interior_angles(corner_xy, corner_offsets))
     deviation = np.add.reduceat(np.abs(angle - 90.0), corner_offsets[:-1])
     sides = np.diff(corner_offsets)
-    on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
-    side_frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
-    width, depth = _extents(xy, offsets, corner_xy, corner_offsets, side_frontage)
+    width, depth = _extents(ring.xy, ring.offsets, corner_xy, corner_offsets, ring.frontage)
     area, polygons = mesh.face_area, mesh.face_polygons()
     enough = reached_frontage(area)
     return ParcelMeasures(
         area=area,
-        corners=mesh.origin[half_edges[corners]],
+        corners=mesh.origin[ring.half_edges[ring.corners]],
         corner_offsets=corner_offsets,
         corner_xy=corner_xy,
         corner_angle=angle,
@@ -123,19 +118,40 @@ def measure_parcels(layout: Layout) -> ParcelMeasures:
         area_ratio=shapely.area(shapely.minimum_rotated_rectangle(polygons)) / area,
         rim=layout.rim_parcel,
         reached=layout.frontage >= enough,
-        through=_through_lots(corner_xy, corner_offsets, side_frontage, enough),
+        through=_through_lots(corner_xy, corner_offsets, ring.frontage, enough),
     )
 
 
 def width_and_depth(layout: Layout) -> tuple[FloatArray, FloatArray]:
     """Width and depth of every parcel, as `ParcelMeasures` has them, without the rest of it."""
+    sides = _sides(layout)
+    return _extents(sides.xy, sides.offsets, sides.corner_xy, sides.corner_offsets, sides.frontage)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Rings of the parcels, their corners, and the frontage of each side."""
+
+    half_edges: IntArray
+    offsets: IntArray
+    xy: FloatArray
+    corners: IntArray
+    corner_offsets: IntArray
+    frontage: FloatArray
+
+    @property
+    def corner_xy(self) -> FloatArray:
+        return np.asarray(self.xy[self.corners])
+
+
+def _sides(layout: Layout) -> _Sides:
     mesh = layout.mesh
     half_edges, offsets = mesh.face_rings()
     xy = mesh.xy[mesh.origin[half_edges]]
     corners, corner_offsets = reported_polygons(xy, offsets)
     on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
-    side_frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
-    return _extents(xy, offsets, xy[corners], corner_offsets, side_frontage)
+    frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
+    return _Sides(half_edges, offsets, xy, corners, corner_offsets, frontage)
 
 
 def inscribed_thinness(polygons: npt.NDArray[np.object_], area: FloatArray) -> FloatArray:

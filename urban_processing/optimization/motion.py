@@ -55,9 +55,8 @@ def free_motion(layout: Layout) -> Motion:
     free = ~mesh.vertex_is_boundary
     slide = _slides(layout)
     stays = layout.face_locked | (mesh.face_n_loops > 1)
-    held = np.zeros(mesh.n_vertices, dtype=bool)
+    held = mesh.vertices_of(layout.edge_fixed != NOT_FIXED)
     held[mesh.origin[(mesh.face != OUTSIDE) & stays[mesh.face]]] = True
-    held[mesh.origin[np.repeat(layout.edge_fixed != NOT_FIXED, 2)]] = True
     free &= ~held
     slides = (slide != 0).any(axis=1) & ~held
     unknown = np.full((mesh.n_vertices, 2), STAYS)

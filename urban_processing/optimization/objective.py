@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from urban_processing.layout import EdgeKind, Layout
-from urban_processing.mesh.corners import reported_polygons
+from urban_processing.mesh.corners import reported_corners
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.mesh.straight import go_on_straight, included_angle, pairs_at_nodes
 from urban_processing.optimization.motion import STAYS, Motion
@@ -157,13 +157,10 @@ def _area_limits(layout: Layout, spacing: float) -> list[AreaLimits]:
 
 def _polygons_by_sides(layout: Layout) -> list[IntArray]:
     """Corners of the approximate polygons, one array (F, N) for each number of sides N."""
-    mesh = layout.mesh
-    half_edges, ring_offsets = mesh.face_rings()
-    vertex = mesh.origin[half_edges]
-    corners, offsets = reported_polygons(mesh.xy[vertex], ring_offsets)
+    corners, offsets = reported_corners(layout.mesh)
     n_sides = np.diff(offsets)
     return [
-        vertex[corners[offsets[:-1][n_sides == n, None] + np.arange(n)]]
+        corners[offsets[:-1][n_sides == n, None] + np.arange(n)]
         for n in np.unique(n_sides).tolist()
     ]
 

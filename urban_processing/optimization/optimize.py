@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.layout import Layout
-from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
+from urban_processing.mesh.corners import polygon_irregularity, reported_corners
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.optimization.motion import free_motion
 from urban_processing.optimization.objective import Objective, build_objective
@@ -91,13 +91,13 @@ def optimize_geometry(
     )
     x = minimize(objective, progress=progress.slice(0.0, SOLVING))
     wanted = objective.positions(x) * spacing - mesh.xy
-    best = layout
+    best, before = layout, _figures(layout, network)
     for i, share in enumerate(SHORTENINGS):
         progress.update(SOLVING + (1.0 - SOLVING) * i / len(SHORTENINGS), "Checking every parcel")
         moved = moved_to(
             layout, safe_positions(layout, mesh.xy + share * wanted, least_frontage=least_frontage)
         )
-        if _no_worse(moved, street_network(moved), layout, network):
+        if (_figures(moved, street_network(moved)) <= before).all():
             best = moved
             break
     progress.update(1.0)
@@ -114,21 +114,9 @@ def _summary(before: Layout, after: Layout, objective: Objective, spacing: float
     )
 
 
-def _no_worse(
-    after: Layout, network: StreetNetwork, before: Layout, network_before: StreetNetwork
-) -> bool:
-    return _mean_irregularity(after) <= _mean_irregularity(before) and _mean_deviation(
-        network
-    ) <= _mean_deviation(network_before)
-
-
-def _mean_irregularity(layout: Layout) -> float:
-    half_edges, offsets = layout.mesh.face_rings()
-    xy = layout.mesh.xy[layout.mesh.origin[half_edges]]
-    corners, corner_offsets = reported_polygons(xy, offsets)
-    return float(polygon_irregularity(xy[corners], corner_offsets).mean())
-
-
-def _mean_deviation(network: StreetNetwork) -> float:
-    counted = network.pair_deviation[network.pair_rim < 2]
-    return float(counted.mean()) if len(counted) else 0.0
+def _figures(layout: Layout, network: StreetNetwork) -> FloatArray:
+    """Mean irregularity of the parcels, and mean deviation of the junctions from 90°."""
+    corners, offsets = reported_corners(layout.mesh)
+    irregularity = polygon_irregularity(layout.mesh.xy[corners], offsets)
+    deviation = network.pair_deviation[network.pair_rim < 2]
+    return np.array([irregularity.mean(), deviation.mean() if len(deviation) else 0.0])

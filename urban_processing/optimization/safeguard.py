@@ -28,7 +28,7 @@ from urban_processing.mesh.planar import (
     PlanarMesh,
     linear_rings,
 )
-from urban_processing.site import snap_to_grid
+from urban_processing.site import AREA_ROUNDING, snap_to_grid
 
 WORSE = 0.02
 """A parcel that is irregular may become this much more so; the others do not become irregular."""
@@ -36,9 +36,6 @@ WORSE = 0.02
 FADING = 0.25
 """Largest difference of the shares of the movement between neighbouring vertices: without it a
 vertex that is held back makes a kink."""
-
-AREA_ROUNDING = 1e-9
-"""Share of the smallest area by which areas may differ, for the order in which they are summed."""
 
 HALVINGS = 5
 """Number of times that the movement around a face is halved before it is taken back."""
@@ -79,22 +76,22 @@ def safe_positions(
     mesh = layout.mesh
     shift = wanted - mesh.xy
     share = np.ones(mesh.n_vertices)
-    rings = _Rings.of(layout)
     every = np.arange(mesh.n_faces)
-    before = rings.measure(mesh.xy, every)
+    before = _measured(layout, mesh.xy, every)
     suspects = every
     rounds = 0
     while True:
         xy = np.where(share[:, None] > 0, snap_to_grid(mesh.xy + share[:, None] * shift), mesh.xy)
-        after = rings.measure(xy, suspects)
+        after = _measured(layout, xy, suspects)
         bad = suspects[_loses(layout, before, after, suspects, least_frontage)]
         if len(bad) == 0:
             return xy
-        at = rings.vertices_of(bad)
+        half_edges, _ = mesh.face_rings(bad)
+        at = np.unique(mesh.origin[half_edges])
         less = share.copy()
         less[at] = share[at] / 2 if rounds < HALVINGS else 0.0
         less = _fading(mesh, less)
-        suspects = rings.faces_at(np.flatnonzero(less < share))
+        suspects = _faces_at(mesh, less < share)
         share, rounds = less, rounds + 1
 
 
@@ -121,65 +118,37 @@ def _loses(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Rings:
-    """Rings of the faces of a mesh, to be measured at changing positions."""
-
-    layout: Layout
-    half_edges: IntArray
-    offsets: IntArray
-
-    @classmethod
-    def of(cls, layout: Layout) -> _Rings:
-        half_edges, offsets = layout.mesh.face_rings()
-        return cls(layout, half_edges, offsets)
-
-    def measure(self, xy: FloatArray, faces: IntArray) -> _Faces:
-        """Measure faces with the mesh's vertices at `xy`."""
-        mesh = self.layout.mesh
-        half, offsets = _select(self.half_edges, self.offsets, faces)
-        points = xy[mesh.origin[half]]
-        edge = xy[mesh.target[half]] - points
-        length = np.hypot(edge[:, 0], edge[:, 1])
-        on_street = np.where(self.layout.edge_street[half >> 1], length, 0.0)
-        area = ring_areas(points, offsets)
-        simple = shapely.is_valid(shapely.polygons(linear_rings(points, offsets)))
-        old = mesh.xy[mesh.target[half]] - mesh.xy[mesh.origin[half]]
-        turned = mesh.edge_is_boundary[half >> 1] & ((edge * old).sum(axis=1) <= 0)
-        sound = simple & (area > 0) & ~np.logical_or.reduceat(turned, offsets[:-1])
-        irregularity = np.full(len(faces), np.inf)
-        good = np.flatnonzero(sound)
-        if len(good):
-            at, good_offsets = _select(np.arange(len(half)), offsets, good)
-            corners, corner_offsets = reported_polygons(points[at], good_offsets)
-            irregularity[good] = polygon_irregularity(points[at][corners], corner_offsets)
-        return _Faces(
-            area=np.maximum(area, 0.0),
-            frontage=np.add.reduceat(on_street, offsets[:-1]),
-            irregularity=irregularity,
-            sound=np.asarray(sound),
-        )
-
-    def vertices_of(self, faces: IntArray) -> IntArray:
-        """Vertices around some faces."""
-        half, _ = _select(self.half_edges, self.offsets, faces)
-        return np.unique(self.layout.mesh.origin[half])
-
-    def faces_at(self, vertices: IntArray) -> IntArray:
-        """Faces that meet at some vertices."""
-        mesh = self.layout.mesh
-        touched = np.zeros(mesh.n_vertices, dtype=bool)
-        touched[vertices] = True
-        faces = mesh.face[touched[mesh.origin]]
-        return np.unique(faces[faces != OUTSIDE])
+def _measured(layout: Layout, xy: FloatArray, faces: IntArray) -> _Faces:
+    """Measure faces with the mesh's vertices at `xy`."""
+    mesh = layout.mesh
+    half, offsets = mesh.face_rings(faces)
+    points = xy[mesh.origin[half]]
+    edge = xy[mesh.target[half]] - points
+    length = np.hypot(edge[:, 0], edge[:, 1])
+    on_street = np.where(layout.edge_street[half >> 1], length, 0.0)
+    area = ring_areas(points, offsets)
+    simple = shapely.is_valid(shapely.polygons(linear_rings(points, offsets)))
+    old = mesh.xy[mesh.target[half]] - mesh.xy[mesh.origin[half]]
+    turned = mesh.edge_is_boundary[half >> 1] & ((edge * old).sum(axis=1) <= 0)
+    sound = simple & (area > 0) & ~np.logical_or.reduceat(turned, offsets[:-1])
+    irregularity = np.full(len(faces), np.inf)
+    if sound.any():
+        good, good_offsets = mesh.face_rings(faces[sound])
+        outline = xy[mesh.origin[good]]
+        corners, corner_offsets = reported_polygons(outline, good_offsets)
+        irregularity[sound] = polygon_irregularity(outline[corners], corner_offsets)
+    return _Faces(
+        area=np.maximum(area, 0.0),
+        frontage=np.add.reduceat(on_street, offsets[:-1]),
+        irregularity=irregularity,
+        sound=np.asarray(sound),
+    )
 
 
-def _select(values: IntArray, offsets: IntArray, rows: IntArray) -> tuple[IntArray, IntArray]:
-    """Some rows of a ragged array."""
-    count = np.diff(offsets)[rows]
-    new = np.append(0, np.cumsum(count))
-    step = np.arange(int(new[-1])) - np.repeat(new[:-1], count)
-    return values[np.repeat(offsets[rows], count) + step], new
+def _faces_at(mesh: PlanarMesh, vertices: BoolArray) -> IntArray:
+    """Faces that meet at one of the chosen vertices, (V,)."""
+    faces = mesh.face[vertices[mesh.origin]]
+    return np.unique(faces[faces != OUTSIDE])
 
 
 def moved_to(layout: Layout, xy: FloatArray) -> Layout:

@@ -24,12 +24,11 @@ from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas, set_remnants_aside
-from urban_processing.site import Site
+from urban_processing.site import AREA_ROUNDING, Site
 from urban_processing.streets.entries import choose_entries, join_along_rims
 from urban_processing.streets.generate import extend_streets
 from urban_processing.streets.prune import prune_streets
 from urban_processing.streets.shorten import divide_long_blocks
-from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.first_cuts import tie_together
 from urban_processing.subdivision.holes import cut_through_holes
 from urban_processing.subdivision.level import cut_level

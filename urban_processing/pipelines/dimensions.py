@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from urban_processing.access_rule import MEASURED_M
 from urban_processing.errors import InfeasibleError
 from urban_processing.layout import Layout
 from urban_processing.metrics.measures import LayoutMeasures
@@ -12,9 +13,6 @@ from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.dimensions import unfit_dimensions
 from urban_processing.pipelines.findings import parcel_issues
 from urban_processing.site import Issue
-
-MEASURED_M = 1e-6
-"""Precision in metres of a measured length: coordinates are kept to the micrometre."""
 
 OFF_RATIO = 1.5
 """Parcels whose width : depth is off by more than this factor are counted."""

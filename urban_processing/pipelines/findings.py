@@ -7,12 +7,11 @@ import shapely
 
 from urban_processing.access_rule import reached_frontage, unreached_parcels_of
 from urban_processing.layout import NOT_FIXED, EdgeKind, Layout
-from urban_processing.mesh.planar import BoolArray, FloatArray
+from urban_processing.mesh.planar import FloatArray
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.partition import SWALLOWED_SHARE
-from urban_processing.site import Issue
-from urban_processing.subdivision.cuts import AREA_ROUNDING
+from urban_processing.site import AREA_ROUNDING, Issue
 
 COUNT_TOLERANCE = 0.03
 """The number of parcels is reached within this share."""
@@ -92,7 +91,7 @@ def _sizes(layout: Layout) -> list[Issue]:
     least = np.full(len(area), layout.min_area)
     most = VERY_LARGE * least
     small = (area < least * (1.0 - AREA_ROUNDING)) & ~layout.face_locked
-    whole = _whole_parts(layout)
+    whole = layout.face_alone
     return [
         *parcel_issues(
             layout,
@@ -149,17 +148,12 @@ def right_of_way_findings(layout: Layout) -> list[Issue]:
     )
 
 
-def _whole_parts(layout: Layout) -> BoolArray:
-    """(F,) parcels that are a part of the land each."""
-    return np.asarray(np.bincount(layout.face_part)[layout.face_part] == 1)
-
-
 def _unreached(layout: Layout) -> list[Issue]:
     """Parcels with too little frontage, which happens where the rim is no street."""
     needed = reached_frontage(layout.mesh.face_area)
     unreached = np.zeros(len(needed), dtype=bool)
     unreached[unreached_parcels_of(layout)] = True
-    whole = _whole_parts(layout)
+    whole = layout.face_alone
     return [
         *parcel_issues(
             layout,
@@ -186,10 +180,8 @@ def _ends(layout: Layout) -> list[Issue]:
     mesh = layout.mesh
     at = mesh.origin[np.repeat(layout.edge_street, 2)]
     ends = (np.bincount(at, minlength=mesh.n_vertices) == 1) & ~layout.vertex_entry
-    given = _at_vertices(layout, layout.edge_fixed != NOT_FIXED)
-    at_hole = _at_vertices(
-        layout, (layout.edge_kind == EdgeKind.HOLE) | (layout.edge_kind == EdgeKind.OBSTACLE)
-    )
+    given = mesh.vertices_of(layout.edge_fixed != NOT_FIXED)
+    at_hole = mesh.vertices_of(np.isin(layout.edge_kind, (EdgeKind.HOLE, EdgeKind.OBSTACLE)))
     reasons = np.select(
         [given, at_hole],
         ["is that of a given street and stays.", "could not be led on past the hole or obstacle."],
@@ -203,10 +195,3 @@ def _ends(layout: Layout) -> list[Issue]:
         )
         for v in np.flatnonzero(ends).tolist()
     ]
-
-
-def _at_vertices(layout: Layout, edges: BoolArray) -> BoolArray:
-    """(V,) vertices of some edges."""
-    out = np.zeros(layout.mesh.n_vertices, dtype=bool)
-    out[layout.mesh.origin[np.repeat(edges, 2)]] = True
-    return out

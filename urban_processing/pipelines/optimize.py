@@ -15,8 +15,7 @@ from urban_processing.pipelines.findings import CUT_OFF, SWALLOWED, right_of_way
 from urban_processing.progress import SILENT, Progress
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
-from urban_processing.site import Issue
-from urban_processing.subdivision.cuts import AREA_ROUNDING
+from urban_processing.site import AREA_ROUNDING, Issue
 from urban_processing.version import __version__
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import ParameterError
+from urban_processing.mesh.places import line_segments
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.rights_of_way.partition import RightsOfWay, partition
 from urban_processing.rights_of_way.surfaces import (
@@ -99,9 +100,7 @@ def _segments(
     edges: Geometries, centrelines: Sequence[shapely.LineString], width: FloatArray
 ) -> tuple[FloatArray, IntArray]:
     """Pieces of edges that lie on a centreline, and which: the widest of several."""
-    xy, edge = shapely.get_coordinates(edges, return_index=True)
-    same = edge[1:] == edge[:-1]
-    pieces = np.stack([xy[:-1], xy[1:]], axis=1)[same]
+    pieces, _ = line_segments(edges)
     piece, line = shapely.STRtree(np.asarray(centrelines, dtype=object)).query(
         shapely.points(pieces.mean(axis=1)), predicate="dwithin", distance=BESIDE
     )

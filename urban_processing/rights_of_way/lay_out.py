@@ -119,8 +119,7 @@ def _street_sides(layout: Layout, network: StreetNetwork) -> StreetSides:
 def _turning_heads(layout: Layout, network: StreetNetwork) -> Circles:
     """Circles at dead ends, but for those on the outer rim, where a street leaves the land."""
     mesh, radius = layout.mesh, layout.street_rules.turning_radius
-    on_rim = np.zeros(mesh.n_vertices, dtype=bool)
-    on_rim[mesh.origin[np.repeat(layout.edge_kind == EdgeKind.RIM, 2)]] = True
+    on_rim = mesh.vertices_of(layout.edge_kind == EdgeKind.RIM)
     first = network.half_edges[network.offsets[:-1]]
     last = network.half_edges[network.offsets[1:] - 1]
     half = np.concatenate([first, last ^ 1])

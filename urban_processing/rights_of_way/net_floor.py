@@ -6,17 +6,15 @@ import math
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from urban_processing.access_rule import MEASURED_M, reached_frontage
+from urban_processing.access_rule import unreached_parcels_of
 from urban_processing.layout import NOT_FIXED, REMNANT_USE, EdgeKind, Layout
+from urban_processing.mesh.components import components
 from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.rights_of_way.lay_out import lay_out_rights_of_way
-from urban_processing.site import Issue
+from urban_processing.site import AREA_ROUNDING, Issue
 from urban_processing.street_rules import StreetRules
-from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.recut import SIDES_COST, Pair, join_pairs, joinable_pairs
 
 CORNERS = 1.1
@@ -91,8 +89,8 @@ def set_remnants_aside(layout: Layout, min_area: float) -> Layout:
 
 def _too_small(layout: Layout, net: FloatArray, min_area: float) -> BoolArray:
     """(F,) parcels under the floor that are not alone in their part."""
-    alone = np.bincount(layout.face_part)[layout.face_part] == 1
-    return np.asarray((net < min_area * (1.0 - AREA_ROUNDING)) & ~alone & ~layout.face_locked)
+    small = net < min_area * (1.0 - AREA_ROUNDING)
+    return np.asarray(small & ~layout.face_alone & ~layout.face_locked)
 
 
 def _joined(layout: Layout, net: FloatArray, min_area: float) -> Layout:
@@ -170,15 +168,9 @@ def _opened(layout: Layout, net: FloatArray, small: BoolArray) -> Layout:
 def _keeps_given(before: Layout, after: Layout) -> bool:
     """Whether all given streets are streets still, and lead to the entries as before."""
     given = after.edge_fixed != NOT_FIXED
-    led = _at_street(before) & before.vertex_entry
-    return bool(after.edge_street[given].all() and _at_street(after)[led].all())
-
-
-def _at_street(layout: Layout) -> BoolArray:
-    """(V,) vertices of streets."""
-    out = np.zeros(layout.mesh.n_vertices, dtype=bool)
-    out[layout.mesh.origin[np.repeat(layout.edge_street, 2)]] = True
-    return out
+    led = before.mesh.vertices_of(before.edge_street) & before.vertex_entry
+    still_led = after.mesh.vertices_of(after.edge_street)[led].all()
+    return bool(after.edge_street[given].all() and still_led)
 
 
 def _absorbing(layout: Layout, face: int, reached: BoolArray) -> Layout | None:
@@ -202,8 +194,9 @@ def _absorbing(layout: Layout, face: int, reached: BoolArray) -> Layout | None:
 
 
 def _reached(layout: Layout) -> BoolArray:
-    least = reached_frontage(layout.mesh.face_area) - MEASURED_M
-    return np.asarray(layout.frontage >= least)
+    out = np.ones(layout.mesh.n_faces, dtype=bool)
+    out[unreached_parcels_of(layout)] = False
+    return out
 
 
 def _runs_beside(layout: Layout, face: int) -> list[IntArray]:
@@ -224,8 +217,7 @@ def _runs_beside(layout: Layout, face: int) -> list[IntArray]:
         np.column_stack([np.tile(block, 2), ends.T.ravel()]), axis=0, return_inverse=True
     )
     node = node.reshape(2, -1)
-    graph = coo_array((np.ones(len(edges)), (node[0], node[1])), shape=(len(key), len(key)))
-    label = connected_components(graph, directed=False)[1][node[0]]
+    label = components(len(key), node.T)[node[0]]
     runs = [edges[label == k] for k in np.unique(label)]
     return sorted(runs, key=lambda run: (float(mesh.edge_length[run].sum()), int(run[0])))
 
@@ -245,9 +237,8 @@ def _connected(layout: Layout) -> Layout:
     """The layout with the longest connected network of each part alone."""
     mesh = layout.mesh
     edges = np.flatnonzero(layout.edge_street)
-    a, b = mesh.origin.reshape(-1, 2)[edges].T
-    shape = (mesh.n_vertices, mesh.n_vertices)
-    label = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=shape))[1][a]
+    ends = mesh.origin.reshape(-1, 2)[edges]
+    label = components(mesh.n_vertices, ends)[ends[:, 0]]
     part = layout.face_part[mesh.face.reshape(-1, 2)[edges].max(axis=1)]
     length = np.bincount(label, weights=mesh.edge_length[edges])[label]
     order = np.lexsort((label, -np.round(length, 6), part))

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.rebuild import canonical_rings
 from urban_processing.rights_of_way.surfaces import Geometries, Surfaces
 from urban_processing.site import GRID
 

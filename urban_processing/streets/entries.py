@@ -134,9 +134,8 @@ def join_along_rims(layout: Layout, params: CogenerateParams) -> Layout:
     """
     state = StreetState(layout, params)
     view = state.with_rims()
-    alone = np.bincount(layout.face_part)[layout.face_part] == 1
     short = layout.frontage < reached_frontage(layout.mesh.face_area)
-    left = np.flatnonzero(short & ~alone).tolist()
+    left = np.flatnonzero(short & ~layout.face_alone).tolist()
     if left:
         distance = view.network_distance()
         for group in group_parcels(view, left):

@@ -65,18 +65,15 @@ def _extents(
     mesh: PlanarMesh, graph: CornerGraph, chains: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Extent along and across each chain (from end to end) of the parcel on its left."""
-    half_edges, offsets = mesh.face_rings()
     z = mesh.xy[:, 0] + 1j * mesh.xy[:, 1]
     node = z[graph.node_vertex]
     chord = node[graph.end[chains]] - node[graph.start[chains]]
     chord = np.where(chord == 0, graph.leaving[chains], chord)
-    face = graph.face[chains]
-    count = np.diff(offsets)[face]
-    start = np.append(0, np.cumsum(count))
-    ring = np.repeat(offsets[face] - start[:-1], count) + np.arange(start[-1])
+    ring, start = mesh.face_rings(graph.face[chains])
+    count = np.diff(start)
     # relative to a vertex of the ring, so that far-off parcels lose no digits
-    first = z[mesh.origin[half_edges[offsets[face]]]]
-    local = z[mesh.origin[half_edges[ring]]] - np.repeat(first, count)
+    first = z[mesh.origin[ring[start[:-1]]]]
+    local = z[mesh.origin[ring]] - np.repeat(first, count)
     local *= np.repeat(np.conj(chord) / np.abs(chord), count)
     return _extent(local.real, start), _extent(local.imag, start)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from urban_processing.access_rule import MEASURED_M
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import IntArray
 from urban_processing.params import CogenerateParams
@@ -19,9 +20,6 @@ from urban_processing.streets.state import StreetState
 
 SMALLEST_HALF = 4
 """Number of parcels that both halves of a divided block have at least; three make a small one."""
-
-MEASURED_M = 1e-6
-"""Precision in metres of a measured length."""
 
 OFF_CENTRE_COST = 12.0
 """Cost of a street at the end of the side it divides, against one at its middle."""

@@ -8,10 +8,9 @@ begins or ends on the graph of its part, once there is one.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from urban_processing.layout import EdgeKind, Layout
+from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import BoolArray, IntArray
 
 BARE = -1
@@ -27,9 +26,5 @@ def edge_networks(layout: Layout) -> IntArray:
     """(E,) connected piece of the graph of usable edges; `BARE` for the others."""
     mesh = layout.mesh
     on = usable_edges(layout)
-    a, b = mesh.origin.reshape(-1, 2)[on].T
-    n = mesh.n_vertices
-    _, label = connected_components(
-        coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False
-    )
+    label = components(mesh.n_vertices, mesh.origin.reshape(-1, 2)[on])
     return np.where(on, label[mesh.origin[0::2]], BARE)

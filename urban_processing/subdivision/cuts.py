@@ -17,9 +17,6 @@ from urban_processing.subdivision.parcels import Boundary
 CLEARANCE = 0.18
 """A cut nearer than this many √area to the boundary leaves a sliver."""
 
-AREA_ROUNDING = 1e-9
-"""Share by which rounding may take an area below the smallest one allowed."""
-
 SATELLITE = 0.12
 """Distance in √area of the seeds beside the centroid."""
 

@@ -12,9 +12,8 @@ import shapely
 from urban_processing.layout import Layout
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray, linear_rings
-from urban_processing.site import GRID, snap_to_grid
+from urban_processing.site import AREA_ROUNDING, GRID, snap_to_grid
 from urban_processing.subdivision.attach import BARE, usable_edges
-from urban_processing.subdivision.cuts import AREA_ROUNDING
 from urban_processing.subdivision.parcels import ParcelRings
 from urban_processing.subdivision.streamline import Cut
 

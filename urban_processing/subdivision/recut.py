@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from urban_processing.access_rule import is_reached
 from urban_processing.layout import Layout
-from urban_processing.mesh.corners import polygon_irregularity, reported_polygons
+from urban_processing.mesh.corners import polygon_irregularity, reported_corners
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
@@ -74,11 +74,8 @@ def recut_irregular(
 
 def _costs(layout: Layout, params: CogenerateParams) -> FloatArray:
     """(F,) irregularity of each parcel, and what sides and frontage cost that are not wanted."""
-    mesh = layout.mesh
-    half_edges, ring_offsets = mesh.face_rings()
-    xy = mesh.xy[mesh.origin[half_edges]]
-    corners, offsets = reported_polygons(xy, ring_offsets)
-    irregularity = polygon_irregularity(xy[corners], offsets)
+    corners, offsets = reported_corners(layout.mesh)
+    irregularity = polygon_irregularity(layout.mesh.xy[corners], offsets)
     cost = irregularity + SIDES_COST * (np.diff(offsets) != 4)
     if params.least_frontage is not None:
         short = np.maximum(1.0 - layout.frontage / params.least_frontage, 0.0)

@@ -10,7 +10,8 @@ from urban_processing.fields.rings import ComplexArray, cross
 from urban_processing.hashing import UintArray, uniform
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.subdivision.cuts import AREA_ROUNDING, CLEARANCE, Cuts
+from urban_processing.site import AREA_ROUNDING
+from urban_processing.subdivision.cuts import CLEARANCE, Cuts
 from urban_processing.subdivision.halves import Ideal, half_polygons
 from urban_processing.subdivision.parcels import CONTINUES_ANGLE, Boundary
 

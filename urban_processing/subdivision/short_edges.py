@@ -13,6 +13,7 @@ from urban_processing.layout import NOT_FIXED, Layout
 from urban_processing.mesh.corners import (
     mean_side_length,
     polygon_irregularity,
+    reported_corners,
     reported_polygons,
     ring_areas,
 )
@@ -62,10 +63,8 @@ def remove_short_edges(layout: Layout, *, min_area: float) -> Layout:
 def _short_chains(layout: Layout) -> list[list[int]]:
     """Chains of half-edges that are too short, the shortest first."""
     graph = layout.corner_graph
-    half_edges, offsets = layout.mesh.face_rings()
-    xy = layout.mesh.xy[layout.mesh.origin[half_edges]]
-    corners, corner_offsets = reported_polygons(xy, offsets)
-    side = mean_side_length(xy[corners], corner_offsets)
+    corners, corner_offsets = reported_corners(layout.mesh)
+    side = mean_side_length(layout.mesh.xy[corners], corner_offsets)
     with_outside = np.append(side, np.inf)
     least = np.minimum(with_outside[graph.face[0::2]], with_outside[graph.face[1::2]])
     ratio = graph.length[0::2] / least
