@@ -28,6 +28,8 @@ class Param:
     above: float | None = None
     advanced: bool = False
     group: str = ""
+    per_feature: bool = False
+    """Whether a column of that name in the main input overrides the value, feature by feature."""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Readable labels of an enum's values."""
 

@@ -1,0 +1,1 @@
+"""Blocks: what streets leave between them."""

@@ -1,0 +1,144 @@
+"""What a strategy takes and gives: ground to be divided, and the pieces made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from urban_processing.blocks.model import BlockRings
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+
+UintArray = npt.NDArray[np.uint64]
+
+FINE_GRID = 2.0**-28
+"""Spacing in metres of the grid that points added by subdivision are kept on. On the grid of all
+other coordinates, 256 times as coarse, a point on the edge of a block would lie so far beside
+it that areas of a small block's parcels no longer add up to 1e-9 of its own. Coordinates on
+it, too, are shifted to the map and back without loss."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """B polygons to be divided, and what their edges are; what runs over edges is N long.
+
+    Parameters
+    ----------
+    rings
+        Rings of the polygons: shells counter-clockwise, holes clockwise.
+    access
+        (N,) whether an edge is a street side.
+    width
+        (N,) width of the street along an edge in metres; NaN where none is known.
+    street
+        (N,) number of the street along an edge; -1 where none is known.
+    lineage
+        (B,) seed of each polygon's random numbers, to be used with `hashing.uniform`.
+    """
+
+    rings: BlockRings
+    access: BoolArray
+    width: FloatArray
+    street: IntArray
+    lineage: UintArray
+
+    def __len__(self) -> int:
+        """Return the number of polygons."""
+        return len(self.lineage)
+
+
+@dataclass(frozen=True, eq=False)
+class Rules:
+    """What the parcels of B polygons are to be, one value for each; areas in m², lengths in m.
+
+    Parameters
+    ----------
+    min_area, max_area, min_width, max_width
+        Bounds (Vanegas 2012, section 4.1).
+    irregularity
+        ω, 0 to 1.
+    street_access
+        ξ, 0 to 1.
+    offset
+        Depth of rows along streets; infinite where they meet back to back.
+    by_length
+        Whether corner lots belong to the longer street, not to the wider one.
+    snap
+        Distance within which a cut goes through a vertex of the contour.
+    corner
+        Angle in degrees; a contour that bends by more is another street from there on.
+    """
+
+    min_area: FloatArray
+    max_area: FloatArray
+    min_width: FloatArray
+    max_width: FloatArray
+    irregularity: FloatArray
+    street_access: FloatArray
+    offset: FloatArray
+    by_length: BoolArray
+    snap: FloatArray
+    corner: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Faces that tile the ground; V vertices, R rings, F faces. They share vertices by index.
+
+    A vertex of one face that lies on the boundary of another is a vertex of that one too.
+
+    Parameters
+    ----------
+    xy
+        (V, 2) vertices: first those of the ground in their order, then those added, on
+        `FINE_GRID`.
+    vertex
+        (N,) vertices of all rings, one after the other; shells counter-clockwise.
+    offsets
+        (R + 1,) where rings begin in `vertex`.
+    face
+        (R,) face of each ring, not decreasing; its shell first.
+    access
+        (N,) whether the edge from a ring's vertex to the next is a street side.
+    block
+        (F,) polygon of the ground that a face is a piece of, not decreasing.
+    lineage
+        (F,) seed of each face, unique within the ground, that depends on its own path alone.
+    level
+        (F,) number of cuts that made a face.
+    patio
+        (F,) faces that are the inside of a perimeter block.
+    """
+
+    xy: FloatArray
+    vertex: IntArray
+    offsets: IntArray
+    face: IntArray
+    access: BoolArray
+    block: IntArray
+    lineage: UintArray
+    level: IntArray
+    patio: BoolArray
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.block)
+
+    def polygons(self) -> npt.NDArray[np.object_]:
+        """(F,) the faces as shapely polygons."""
+        size = np.diff(self.offsets)
+        closed = np.append(0, np.cumsum(size + 1))
+        at = np.arange(closed[-1]) - np.repeat(np.arange(len(size)), size + 1)
+        at[closed[1:] - 1] = self.offsets[:-1]
+        rings_of_face = np.searchsorted(self.face, np.arange(self.n_faces + 1))
+        return np.asarray(
+            shapely.from_ragged_array(
+                shapely.GeometryType.POLYGON,
+                self.xy[self.vertex[at]],
+                (closed, rings_of_face),
+            ),
+            dtype=object,
+        )

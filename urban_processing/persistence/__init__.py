@@ -1,0 +1,1 @@
+"""Parcels that stay themselves through edits (Vanegas 2012, section 5)."""

@@ -1,0 +1,1 @@
+"""The straight skeleton of polygons (Aichholzer et al. 1995)."""
