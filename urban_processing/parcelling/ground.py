@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +49,13 @@ class Ground:
         """Return the number of polygons."""
         return len(self.lineage)
 
+    def of(self, rows: IntArray) -> Ground:
+        """Return some of the polygons."""
+        rings, edges = self.rings.of(rows)
+        return Ground(
+            rings, self.access[edges], self.width[edges], self.street[edges], self.lineage[rows]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Rules:
@@ -81,6 +89,10 @@ class Rules:
     by_length: BoolArray
     snap: FloatArray
     corner: FloatArray
+
+    def of(self, rows: IntArray) -> Rules:
+        """Return the rules of some polygons."""
+        return Rules(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
