@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.blocks.model import BlockRings
+from urban_processing.blocks.model import BlockRings, ragged_rows
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 
 UintArray = npt.NDArray[np.uint64]
@@ -154,3 +154,24 @@ class Pieces:
             ),
             dtype=object,
         )
+
+
+def sort_faces(pieces: Pieces) -> Pieces:
+    """Put faces into the order of their blocks; those of one block stay in theirs."""
+    order = np.argsort(pieces.block, kind="stable")
+    rings = ragged_rows(np.searchsorted(pieces.face, np.arange(pieces.n_faces + 1)), order)
+    edges = ragged_rows(pieces.offsets, rings)
+    size = np.diff(pieces.offsets)[rings]
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return Pieces(
+        xy=pieces.xy,
+        vertex=pieces.vertex[edges],
+        offsets=np.append(0, np.cumsum(size)),
+        face=rank[pieces.face[rings]],
+        access=pieces.access[edges],
+        block=pieces.block[order],
+        lineage=pieces.lineage[order],
+        level=pieces.level[order],
+        patio=pieces.patio[order],
+    )

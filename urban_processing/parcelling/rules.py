@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -47,6 +48,30 @@ class BlockRules:
     def of(self, rows: IntArray) -> BlockRules:
         """Return the rules of some blocks."""
         return BlockRules(self.rules.of(rows), self.strategy[rows], self.patio[rows])
+
+
+def rule_values(wanted: BlockRules) -> dict[str, npt.NDArray[np.object_]]:
+    """Return rules as values of the parameters that columns may override; None for no offset.
+
+    Given as columns they lead to the same rules.
+    """
+    rules = wanted.rules
+    values: dict[str, Any] = {
+        "strategy": wanted.strategy,
+        "offset": np.where(np.isinf(rules.offset), None, rules.offset.astype(object)),
+        "patio": wanted.patio,
+        "corner_lots": np.where(
+            rules.by_length, CornerLots.STREET_LENGTH.value, CornerLots.STREET_WIDTH.value
+        ),
+    }
+    names = per_block_parameters()
+    return {name: _plain(values.get(name, getattr(rules, name, None))) for name in names}
+
+
+def _plain(values: npt.NDArray[Any]) -> npt.NDArray[np.object_]:
+    out = np.empty(len(values), dtype=object)
+    out[:] = [v.value if isinstance(v, enum.Enum) else v for v in values.tolist()]
+    return out
 
 
 def resolve_rules(
