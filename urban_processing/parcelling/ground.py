@@ -11,14 +11,9 @@ import shapely
 
 from urban_processing.blocks.model import BlockRings, ragged_rows
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.site import FINE_GRID as FINE_GRID
 
 UintArray = npt.NDArray[np.uint64]
-
-FINE_GRID = 2.0**-28
-"""Spacing in metres of the grid that points added by subdivision are kept on. On the grid of all
-other coordinates, 256 times as coarse, a point on the edge of a block would lie so far beside
-it that areas of a small block's parcels no longer add up to 1e-9 of its own. Coordinates on
-it, too, are shifted to the map and back without loss."""
 
 
 @dataclass(frozen=True, eq=False)
