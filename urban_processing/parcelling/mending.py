@@ -29,6 +29,8 @@ class Needs:
         Shortest front of a strip.
     by_length
         Whether the longer street wins a corner, not the wider one.
+    reach
+        Length over which bends of the contour are measured.
     snap
         Distance within which a cut goes through a vertex.
     """
@@ -38,6 +40,7 @@ class Needs:
     mean_depth: float
     front: float
     by_length: bool
+    reach: float
     snap: float
 
 
@@ -127,6 +130,8 @@ def _foot(sheet: Sheet, strip: Strip, apex: int, needs: Needs) -> tuple[int, flo
         gap = math.hypot(x[u] + share * ex - px, y[u] + share * ey - py)
         spots.append((round(gap, 7), k, share))
     ring = strip.ring
+    at = ring.index(apex)
+    beside = (ring[at - 1], ring[(at + 1) % len(ring)])
     for gap, k, exact in sorted(spots):
         share = exact
         u, v = strip.front[k], strip.front[k + 1]
@@ -134,7 +139,10 @@ def _foot(sheet: Sheet, strip: Strip, apex: int, needs: Needs) -> tuple[int, flo
         near = min(needs.snap, 0.05 * gap, 0.4 * length)
         share = 0.0 if share * length < near else 1.0 if (1.0 - share) * length < near else share
         qx, qy = x[u] + share * (x[v] - x[u]), y[u] + share * (y[v] - y[u])
-        if gap > 1e-6 and sees(sheet, ring, (px, py), (qx, qy)):
+        if gap <= 1e-6:
+            continue
+        end = u if share <= 0.0 else v if share >= 1.0 else -1
+        if end in beside or sees(sheet, ring, (px, py), (qx, qy)):
             return k, share
     return None
 
@@ -173,9 +181,7 @@ def _cut_front(sheet: Sheet, strip: Strip, segment: int, share: float) -> tuple[
         return u, segment
     if share >= 1.0:
         return v, segment + 1
-    vertex = sheet.add_between(u, v, share)
-    sheet.height[vertex] = 0.0
-    sheet.contour_edge[vertex] = sheet.edge_of(u)
+    vertex = sheet.add_on(u, v, share)
     strip.front.insert(segment + 1, vertex)
     return vertex, segment + 1
 

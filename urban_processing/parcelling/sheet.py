@@ -74,6 +74,15 @@ class Sheet:
             return edge
         return -1
 
+    def add_on(self, u: int, v: int, share: float) -> int:
+        """Add a vertex on an edge of a ring, which may be a part of the contour."""
+        vertex = self.add_between(u, v, share)
+        side = max(self.contour_side(u, v), self.contour_side(v, u))
+        if side >= 0:
+            self.contour_edge[vertex] = side
+            self.height[vertex] = 0.0
+        return vertex
+
     def insert(self, u: int, v: int, share: float) -> int:
         """Return the vertex at a share of the edge from ``u`` to ``v``, added if need be."""
         if u > v:
@@ -88,10 +97,7 @@ class Sheet:
         for near in (at - 1, at):
             if 0 <= near < len(points) and abs(points[near][0] - share) * length < SAME:
                 return points[near][1]
-        vertex = self.add_between(u, v, share)
-        side = max(self.contour_side(u, v), self.contour_side(v, u))
-        if side >= 0:
-            self.contour_edge[vertex] = side
+        vertex = self.add_on(u, v, share)
         points.insert(at, (share, vertex))
         return vertex
 
@@ -100,6 +106,16 @@ class Sheet:
         if u < v:
             return self._points.get((u, v), [])
         return [(1.0 - share, at) for share, at in reversed(self._points.get((v, u), []))]
+
+    def within(self, u: int, v: int) -> list[int]:
+        """Return the numbers of all points inserted on an edge, and on parts of it."""
+        points = [point for _, point in self.between(u, v)]
+        if not points:
+            return []
+        found = self.within(u, points[0])
+        for a, b in zip(points, [*points[1:], v], strict=True):
+            found += [a, *self.within(a, b)]
+        return found
 
     def area(self, ring: Sequence[int]) -> float:
         """Signed area of a ring."""

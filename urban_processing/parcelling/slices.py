@@ -90,6 +90,11 @@ class Slicer:
         x, y = self.sheet.x, self.sheet.y
         return (x[u] - self.x0) * (y[v] - self.y0) - (x[v] - self.x0) * (y[u] - self.y0)
 
+    @property
+    def length(self) -> float:
+        """Length of the front."""
+        return self.s[-1]
+
     def bay_at(self, s: float) -> Bay:
         """Return the bay at a length along the front."""
         return self.bays[max(bisect.bisect_right(self.starts, s) - 1, 0)]
@@ -164,17 +169,17 @@ class Slicer:
         """Return the lines, in the order of the front."""
         spots, areas, numbers = self.measure()
         count = self.number(spots, areas, numbers)
+        tries = [(1.0, True), (1.0, False), (0.5, True), (0.0, True), (0.0, False)]
+        if self.bounds.irregularity == 0.0:
+            tries = tries[-2:]
         while count > 1:
-            for spread, snap in ((1.0, True), (1.0, False), (0.5, True), (0.0, True), (0.0, False)):
-                if self.bounds.irregularity == 0.0 and spread:
-                    continue
-                shares = self._shares(draws[: count], spread)
-                ends = [
-                    _interpolated(share * numbers[-1], numbers, spots) for share in shares[:-1]
-                ]
-                cuts = self._lines(ends, snap=snap)
-                if self._within_bounds(cuts):
-                    return cuts
+            for most in (self.bounds.max_area, math.inf):
+                for spread, snap in tries:
+                    shares = self._shares(draws[:count], spread)
+                    ends = [_interpolated(a * numbers[-1], numbers, spots) for a in shares[:-1]]
+                    cuts = self._lines(ends, snap=snap)
+                    if self._within_bounds(cuts, most):
+                        return cuts
             count -= 1
         return []
 
@@ -223,14 +228,14 @@ class Slicer:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
         return (s, hit) if best is None else best[1:]
 
-    def _within_bounds(self, cuts: list[Cut]) -> bool:
+    def _within_bounds(self, cuts: list[Cut], max_area: float) -> bool:
         b = self.bounds
         s = [0.0, *(cut.s for cut in cuts), self.s[-1]]
         areas = [0.0, *(self.area_before(cut) for cut in cuts), self.area]
         backs = [cut.hit.at for cut in cuts]
         return (
             all(t - s >= 0.98 * b.min_width for s, t in pairwise(s))
-            and all(high - low >= b.min_area for low, high in pairwise(areas))
+            and all(b.min_area <= high - low <= max_area for low, high in pairwise(areas))
             and all(later <= before + 1e-9 for before, later in pairwise(backs))
         )
 
@@ -249,9 +254,7 @@ class Slicer:
                 vertex, passed = front[cut.place + 1], cut.place + 1
             else:
                 u, v = front[cut.place], front[cut.place + 1]
-                vertex = sheet.add_between(u, v, cut.share)
-                sheet.height[vertex] = 0.0
-                sheet.contour_edge[vertex] = sheet.edge_of(u)
+                vertex = sheet.add_on(u, v, cut.share)
                 passed = cut.place + 1
             edge = min(math.floor(cut.hit.at), last - 1)
             rear = sheet.insert(back[edge], back[edge + 1], cut.hit.at - edge)

@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+
+from urban_processing.parcelling.divided import Polygon
+from urban_processing.parcelling.sheet import Sheet
 
 NAMED_BEND = 15.0
 """Bend in degrees at which another number of the street makes another logical street."""
@@ -82,6 +86,43 @@ class Street:
         known = [side for side in self.sides if side.width == side.width]
         total = sum(side.length for side in known)
         return sum(s.width * s.length for s in known) / total if total else math.nan
+
+
+def sides_of_rings(sheet: Sheet, polygon: Polygon, edge_face: Sequence[int]) -> list[list[Side]]:
+    """Return the sides of each ring of a polygon, given the face of the skeleton on each edge."""
+    rings = []
+    for low, high in pairwise(polygon.offsets.tolist()):
+        starts = [k for k in range(low, high) if edge_face[k] != edge_face[k - 1 if k > low else high - 1]]
+        stops = starts[1:] + starts[:1]
+        rings.append([_side(sheet, polygon, edge_face[k], k, stop) for k, stop in zip(starts, stops, strict=True)])
+    return rings
+
+
+def _side(sheet: Sheet, polygon: Polygon, face: int, start: int, stop: int) -> Side:
+    run = [start]
+    while run[-1] != stop or len(run) == 1:
+        run.append(sheet.following[run[-1]])
+    x, y = sheet.x, sheet.y
+    length = sheet.distance(start, stop)
+    known = [
+        (sheet.distance(u, v), polygon.width[u], polygon.street[u])
+        for u, v in pairwise(run)
+        if polygon.access[u]
+    ]
+    wide = [(part, width) for part, width, _ in known if not math.isnan(width)]
+    total = sum(part for part, _ in wide)
+    return Side(
+        face=face,
+        run=run,
+        x=x[start],
+        y=y[start],
+        dx=(x[stop] - x[start]) / length,
+        dy=(y[stop] - y[start]) / length,
+        length=length,
+        access=bool(known),
+        width=sum(part * width for part, width in wide) / total if total else math.nan,
+        street=max(known)[2] if known else -1,
+    )
 
 
 def logical_streets(
