@@ -11,6 +11,9 @@ from urban_processing.parcelling.strips import Strip
 
 TINY = 1e-6
 
+STEEP = 0.05
+"""A part of the back that leans by less from a line, along it, is met at its nearer end."""
+
 
 class Hit(NamedTuple):
     """Where a line from the front meets the back.
@@ -137,17 +140,20 @@ class Bay:
             a, b = spots[k], spots[k + 1]
             if not (min(a, b) <= t <= max(a, b)):
                 continue
-            shares = ((t - a) / (b - a),) if a != b else (0.0, 1.0)
-            for share in shares:
-                h = self.h[k] + share * (self.h[k + 1] - self.h[k])
-                if h > TINY and (best is None or h < best[0]):
-                    best = (h, k, share)
+            rise = self.h[k + 1] - self.h[k]
+            if abs(b - a) > STEEP * abs(rise):
+                share = (t - a) / (b - a)
+            else:
+                share = 0.0 if (rise > 0.0) == (self.h[k] > TINY) else 1.0
+            h = self.h[k] + share * rise
+            if h > TINY and (best is None or h < best[0]):
+                best = (h, k, share)
         if best is None:
             k = min(range(last + 1), key=lambda j: abs(spots[j] - t))
             return self._hit(self.at[k], spots[k], self.h[k])
         h, k, share = best
         at = self.at[k] + share * (self.at[k + 1] - self.at[k])
-        return self._hit(at, t, h)
+        return self._hit(at, spots[k] + share * (spots[k + 1] - spots[k]), h)
 
     def _hit(self, at: float, t: float, h: float) -> Hit:
         return Hit(

@@ -57,7 +57,8 @@ def beta_strips(sheet: Sheet, strips: list[Strip], needs: Needs) -> list[Strip]:
         for other in strips:
             if strip is not other and strip.front[-1] == other.front[0]:
                 _mend(sheet, strip, other, needs)
-    return _unite(sheet, strips, needs, shallow=False)
+    strips = [strip for strip in strips if len(strip.ring) > 2]
+    return _unite(sheet, _give_rims(sheet, strips), needs, shallow=False)
 
 
 def _rank(strip: Strip, needs: Needs, *, widths: bool) -> tuple[bool, float, float]:
@@ -220,6 +221,22 @@ def _cut_back(sheet: Sheet, strip: Strip, start: int, stop: int) -> None:
     strip.splice(sheet, start, stop, [])
 
 
+def _give_rims(sheet: Sheet, strips: Sequence[Strip]) -> list[Strip]:
+    """Give what has no street to the strips on streets, each to its longest border.
+
+    In each round borders are those before the round, so that none collects all around a hole.
+    """
+    strips = list(strips)
+    while True:
+        streets = [strip for strip in strips if not strip.street.rim]
+        rims = [strip for strip in strips if strip.street.rim]
+        pairs = [(rim, _host(sheet, rim, streets)) for rim in rims]
+        given = [rim for rim, host in pairs if host is not None and _absorb(sheet, host, rim)]
+        if not given:
+            return strips
+        strips = [s for s in strips if not any(s is rim for rim in given)]
+
+
 def _unite(sheet: Sheet, strips: list[Strip], needs: Needs, *, shallow: bool) -> list[Strip]:
     """Unite strips that cannot stand alone with others, the weakest first."""
     strips = [strip for strip in strips if len(strip.ring) > 2]
@@ -257,10 +274,10 @@ def _unfit(sheet: Sheet, strip: Strip, needs: Needs) -> bool:
 
 
 def _host(sheet: Sheet, strip: Strip, strips: Sequence[Strip]) -> Strip | None:
-    """Return the strip that shares the longest border; one on a street before one on a rim."""
+    """Return the strip that shares the longest border."""
     ring = strip.ring
     edges = set(zip(ring[1:] + ring[:1], ring, strict=True))
-    best: tuple[tuple[bool, float, int], Strip] | None = None
+    best: tuple[tuple[float, int], Strip] | None = None
     for other in strips:
         if other is strip:
             continue
@@ -269,7 +286,7 @@ def _host(sheet: Sheet, strip: Strip, strips: Sequence[Strip]) -> Strip | None:
             for u, v in zip(other.back, other.back[1:], strict=False)
             if (u, v) in edges
         )
-        key = (not other.street.rim, round(border, 6), -other.rank)
+        key = (round(border, 6), -other.rank)
         if border > 0.0 and (best is None or key > best[0]):
             best = (key, other)
     return None if best is None else best[1]

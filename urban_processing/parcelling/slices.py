@@ -10,6 +10,7 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from urban_processing.parcelling.bays import Bay, Hit, bays_of
+from urban_processing.parcelling.mending import sees
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
 from urban_processing.parcelling.strips import Strip
@@ -57,6 +58,7 @@ class Slicer:
     def __init__(self, sheet: Sheet, strip: Strip, bounds: Bounds) -> None:
         self.sheet, self.strip, self.bounds = sheet, strip, bounds
         self.bays = bays_of(sheet, strip)
+        self.ring = strip.ring
         self.starts = [bay.start for bay in self.bays]
         front, back = strip.front, strip.back
         self.s = [0.0, *accumulate(sheet.distance(u, v) for u, v in pairwise(front))]
@@ -137,7 +139,7 @@ class Slicer:
                     continue
                 cuts = [self.cut(s, hits.get(s) or self._cast(s)) for s in ends]
                 if self._within_bounds(cuts):
-                    return cuts
+                    return [cut for cut in cuts if self._clear(cut)]
         return []
 
     def _moved(self, hits: dict[float, Hit], s: float) -> float:
@@ -163,11 +165,15 @@ class Slicer:
             x, y = sheet.x[vertex], sheet.y[vertex]
             if abs(x - hit.x) + abs(y - hit.y) > 2.0 * snap:
                 continue
-            origin = bay.origin((x - bay.x) * bay.dx + (y - bay.y) * bay.dy)
+            t = (x - bay.x) * bay.dx + (y - bay.y) * bay.dy
+            origin = bay.origin(t)
             if origin is None:
                 continue
             gap = abs(origin + bay.start - s)
-            if gap <= snap and (best is None or gap < best[0]):
+            if gap > snap or (best is not None and gap >= best[0]):
+                continue
+            seen = bay.reach(t)
+            if abs(seen.x - x) + abs(seen.y - y) < 1e-3:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
         return (s, hit) if best is None else best[1:]
 
@@ -177,6 +183,15 @@ class Slicer:
         return all(high - low >= self.bounds.min_area for low, high in pairwise(areas)) and all(
             later.hit.at <= before.hit.at + 1e-9 for before, later in pairwise(cuts)
         )
+
+    def _clear(self, cut: Cut) -> bool:
+        """Whether a line runs within the strip; one that is not moved does."""
+        bay = self.bay_at(cut.s)
+        px, py = bay.x + (cut.s - bay.start) * bay.dx, bay.y + (cut.s - bay.start) * bay.dy
+        ex, ey = cut.hit.x - px, cut.hit.y - py
+        if abs(ex * bay.dx + ey * bay.dy) < 1e-3 * math.hypot(ex, ey):
+            return True
+        return sees(self.sheet, self.ring, (px, py), (cut.hit.x, cut.hit.y))
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:
         """Add the ends of the lines to the sheet; return the parts of the strip between them."""
@@ -235,12 +250,8 @@ def _without_spurs(ring: list[int]) -> list[int]:
             kept.pop()
         else:
             kept.append(v)
-    while len(kept) > 2 and kept[0] == kept[-1]:
+    while len(kept) > 2 and (kept[0] == kept[-1] or kept[-2] == kept[0]):
         kept.pop()
-        if kept[-1] == kept[1]:
-            del kept[0]
-    while len(kept) > 2 and kept[-2] == kept[0]:
-        kept = kept[:-2] 
     return kept
 
 
