@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 from urban_processing.parcelling.sheet import Sheet
@@ -47,9 +48,7 @@ class Bay:
         Places of its ends in the front.
     """
 
-    def __init__(
-        self, sheet: Sheet, strip: Strip, start: float, *, first: int, last: int
-    ) -> None:
+    def __init__(self, sheet: Sheet, strip: Strip, start: float, *, first: int, last: int) -> None:
         u, v = strip.front[first], strip.front[last]
         self.start, self.first, self.last = start, first, last
         self.x, self.y = sheet.x[u], sheet.y[u]
@@ -86,7 +85,7 @@ class Bay:
             px, py = px - self.x, py - self.y
             self.t.append(px * self.dx + py * self.dy)
             self.h.append(py * self.dx - px * self.dy)
-        self.falling = all(b <= a for a, b in zip(self.t, self.t[1:], strict=False))
+        self.falling = all(b <= a for a, b in pairwise(self.t))
         self.negative = [-t for t in self.t] if self.falling else []
 
     def _knots(self, right: bool, left: bool) -> None:
@@ -110,14 +109,14 @@ class Bay:
 
     def target(self, s: float) -> float:
         """Where along the run a line from ``s`` ends."""
-        for (s0, t0), (s1, t1) in zip(self.knots, self.knots[1:], strict=False):
+        for (s0, t0), (s1, t1) in pairwise(self.knots):
             if s <= s1:
                 return t0 + (s - s0) * (t1 - t0) / (s1 - s0)
         return self.knots[-1][1]
 
     def origin(self, t: float) -> float | None:
         """Where along the run the line begins that ends at ``t``; None if there is none."""
-        for (s0, t0), (s1, t1) in zip(self.knots, self.knots[1:], strict=False):
+        for (s0, t0), (s1, t1) in pairwise(self.knots):
             if t0 <= t <= t1 and t1 > t0:
                 return s0 + (t - t0) * (s1 - s0) / (t1 - t0)
         return None
@@ -156,9 +155,7 @@ class Bay:
         return self._hit(at, spots[k] + share * (spots[k + 1] - spots[k]), h)
 
     def _hit(self, at: float, t: float, h: float) -> Hit:
-        return Hit(
-            at, self.x + t * self.dx - h * self.dy, self.y + t * self.dy + h * self.dx
-        )
+        return Hit(at, self.x + t * self.dx - h * self.dy, self.y + t * self.dy + h * self.dx)
 
 
 def bays_of(sheet: Sheet, strip: Strip) -> list[Bay]:

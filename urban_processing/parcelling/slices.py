@@ -22,6 +22,7 @@ TRIES = ((1.0, True, 1.01), (1.0, False, 1.01), (0.0, False, 1.05))
 """Shares of ω, whether lines are moved to vertices, and margins over the smallest area, in the
 order in which they are tried. Areas of a profile are a little off, hence the margins."""
 
+
 class Cut(NamedTuple):
     """A line from a point of the front, at length ``s`` along it, to a point of the back.
 
@@ -130,7 +131,9 @@ class Slicer:
         profile = self.profile()
         for count in range(profile.number(), 1, -1):
             for irregularity, snap, margin in TRIES:
-                shares = shares_of(draws[:count], irregularity * self.bounds.irregularity, self.bounds)
+                shares = shares_of(
+                    draws[:count], irregularity * self.bounds.irregularity, self.bounds
+                )
                 hits: dict[float, Hit] = {}
                 ends = profile.ends(
                     shares, partial(self._moved, hits) if snap else _unmoved, margin=margin
@@ -151,8 +154,11 @@ class Slicer:
     def _snapped(self, s: float) -> tuple[float, Hit]:
         snap = self.bounds.snap
         k = bisect.bisect(self.s, s)
-        near = min((self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1), default=math.inf,
-                   key=lambda at: abs(at - s))
+        near = min(
+            (self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1),
+            default=math.inf,
+            key=lambda at: abs(at - s),
+        )
         if abs(near - s) <= snap:
             return near, self._cast(near)
         bay = self.bay_at(s)
@@ -221,8 +227,11 @@ class Slicer:
         return lots
 
 
-def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[int]]:
-    """Rings of the parts of a strip, with all points that were added on its back."""
+def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[list[int]]]:
+    """Rings of the parts of a strip, with all points that were added on its back.
+
+    A part has more than one where it touches itself at a vertex.
+    """
     back = strip.back
     spots: list[tuple[int, int]] = []
     for k, (u, v) in enumerate(pairwise(back)):
@@ -230,29 +239,29 @@ def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[int]
         spots += [(k, point) for _, point in sheet.between(u, v)]
     spots.append((len(back) - 1, back[-1]))
     place = {spot: k for k, spot in enumerate(spots)}
-    rings = []
-    for lot in lots:
-        ring = list(lot.front)
-        for _, vertex in spots[place[lot.begin] : place[lot.end] + 1]:
-            if vertex != ring[-1]:
-                ring.append(vertex)
-        rings.append(_without_spurs(ring))
-    return rings
+    return [
+        _loops(lot.front + [v for _, v in spots[place[lot.begin] : place[lot.end] + 1]])
+        for lot in lots
+    ]
 
 
-def _without_spurs(ring: list[int]) -> list[int]:
-    """Leave out arcs that have the same lot on both sides."""
-    kept: list[int] = []
-    for v in ring:
-        if kept and kept[-1] == v:
-            continue
-        if len(kept) > 1 and kept[-2] == v:
-            kept.pop()
-        else:
-            kept.append(v)
-    while len(kept) > 2 and (kept[0] == kept[-1] or kept[-2] == kept[0]):
-        kept.pop()
-    return kept
+def _loops(ring: list[int]) -> list[list[int]]:
+    """Take a ring apart where it touches itself; arcs walked to and fro fall away."""
+    loops = []
+    chain: list[int] = []
+    at: dict[int, int] = {}
+    for v in [*ring, ring[0]]:
+        if v in at:
+            start = at[v]
+            loop = chain[start:]
+            del chain[start:]
+            for u in loop:
+                del at[u]
+            if len(loop) > 2:
+                loops.append(loop)
+        at[v] = len(chain)
+        chain.append(v)
+    return loops
 
 
 def _unmoved(s: float) -> float:

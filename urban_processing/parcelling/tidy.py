@@ -36,8 +36,7 @@ def tidy(plots: Plots, bounds: Bounds) -> None:
 
 def _faulty(plots: Plots, number: int, bounds: Bounds) -> bool:
     return (
-        plots.area[number] < bounds.min_area
-        or plots.front(number) < LEAST_FRONT * bounds.min_width
+        plots.area[number] < bounds.min_area or plots.front(number) < LEAST_FRONT * bounds.min_width
     )
 
 
