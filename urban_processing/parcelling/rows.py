@@ -140,7 +140,10 @@ def _divide(polygon: Polygon, rules: Rules, k: int, seed: int) -> Divided:
     plots = _parcels(sheet, polygon, strips, bounds, seed)
     tidy(plots, bounds)
     divide_large(plots, bounds)
-    faces = [Face([plots.rings[n]], plots.lineage[n], plots.level[n]) for n in sorted(plots.rings)]
+    faces = [
+        Face([plots.rings[n], *plots.holes[n]], plots.lineage[n], plots.level[n])
+        for n in sorted(plots.rings)
+    ]
     faces += patio_faces(sheet, patios, child(polygon.lineage, _PATIOS))
     straightened(sheet, faces)
     return Divided(polygon, sheet, faces)
@@ -181,11 +184,11 @@ def _parcels(
         count = int(slicer.length / bounds.min_width) + 2
         draws = uniform(seed, np.array([lineage], dtype=np.uint64), count)[0].tolist()
         parts.append((strip, slicer.lots(slicer.cuts(draws)), lineage))
-    rings, seeds = [], []
+    polygons: list[list[list[int]]] = []
+    seeds: list[int] = []
     for strip, lots, lineage in parts:
-        for k, loops in enumerate(rings_of_lots(sheet, strip, lots)):
-            rings += loops
-            seeds += [child(lineage, k)] + [
-                child(child(lineage, k), j) for j in range(1, len(loops))
-            ]
-    return Plots(sheet, rings, seeds, polygon.access)
+        for k, shapes in enumerate(rings_of_lots(sheet, strip, lots)):
+            polygons += shapes
+            own = child(lineage, k)
+            seeds += [own] + [child(own, j) for j in range(1, len(shapes))]
+    return Plots(sheet, polygons, seeds, polygon.access)

@@ -227,10 +227,11 @@ class Slicer:
         return lots
 
 
-def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[list[int]]]:
-    """Rings of the parts of a strip, with all points that were added on its back.
+def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[list[list[int]]]]:
+    """Polygons of each part of a strip, with all points that were added on its back.
 
-    A part has more than one where it touches itself at a vertex.
+    A part is more than one polygon where it touches itself at a vertex. Each has its shell first,
+    then holes: what a part surrounds alone.
     """
     back = strip.back
     spots: list[tuple[int, int]] = []
@@ -239,10 +240,21 @@ def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[list
         spots += [(k, point) for _, point in sheet.between(u, v)]
     spots.append((len(back) - 1, back[-1]))
     place = {spot: k for k, spot in enumerate(spots)}
-    return [
-        _loops(lot.front + [v for _, v in spots[place[lot.begin] : place[lot.end] + 1]])
-        for lot in lots
-    ]
+    rings = (
+        lot.front + [v for _, v in spots[place[lot.begin] : place[lot.end] + 1]] for lot in lots
+    )
+    return [_polygons(sheet, _loops(ring)) for ring in rings]
+
+
+def _polygons(sheet: Sheet, loops: list[list[int]]) -> list[list[list[int]]]:
+    if len(loops) == 1:
+        return [loops]
+    polygons = [[loop] for loop in loops if sheet.area(loop) > 0.0]
+    for loop in loops:
+        if sheet.area(loop) < 0.0:
+            around = [p for p in polygons if sheet.contains(p[0], loop)]
+            min(around or polygons, key=lambda p: sheet.area(p[0])).append(loop)
+    return polygons
 
 
 def _loops(ring: list[int]) -> list[list[int]]:
