@@ -137,7 +137,7 @@ def overlaps(old: ObjectArray, new: ObjectArray, rows: tuple[IntArray, IntArray]
 def changes_of(
     source: IntArray, same: BoolArray, distance: FloatArray, common: Overlaps
 ) -> Changes:
-    """Write the log.
+    """Write the log of parcels whose numbers are known.
 
     Parameters
     ----------

@@ -125,17 +125,29 @@ def _spans(points: FloatArray) -> bool:
 
 
 def _extents(a: FloatArray, b: FloatArray) -> Landmarks:
-    """Corners of the boxes around points, both along the main axes of the first."""
-    box = shapely.minimum_rotated_rectangle(shapely.multipoints(a))
-    along = np.diff(shapely.get_coordinates(box)[:2], axis=0)[0]
-    along = along / np.hypot(*along)
-    axes = np.array([along, [-along[1], along[0]]])
+    """Corners of the boxes around points, both along the axes of the tightest box of the first."""
+    axes = _tightest_axes(a)
     out = []
     for points in (a, b):
         low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
         corner = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
         out.append(corner @ axes)
     return out[0], out[1]
+
+
+def _tightest_axes(points: FloatArray) -> FloatArray:
+    """(2, 2) unit vectors of the box of least area; it has a side on an edge of the hull.
+
+    The oriented envelope of GEOS is another one from another starting vertex.
+    """
+    hull = shapely.get_coordinates(
+        shapely.normalize(shapely.convex_hull(shapely.multipoints(points)))
+    )
+    edge = np.diff(hull, axis=0)
+    along = edge / np.hypot(*edge.T)[:, None]
+    axes = np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
+    extent = np.ptp(np.einsum("eij,pj->eip", axes, hull), axis=2)
+    return np.asarray(axes[int(np.argmin(np.round(extent.prod(axis=1), 6)))])
 
 
 def _thinned(found: Landmarks) -> Landmarks:

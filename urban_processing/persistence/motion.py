@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,9 @@ by the area that they bring to cover."""
 
 _REACH = 0.5
 """A block is found again if its centre comes this near to that of a new one, relative to √area."""
+
+_SETTLED = 0.7
+"""Nothing is searched for where this share of the blocks is covered in place."""
 
 _CLOSE_CALL = 0.02
 """Candidates whose scores differ by no more are equal: the one that moves least is taken."""
@@ -81,12 +85,12 @@ class Shapes:
     polygons: ObjectArray
     corners: list[FloatArray]
 
-    @property
+    @cached_property
     def centre(self) -> FloatArray:
         """(n, 2) centroids."""
         return np.asarray(shapely.get_coordinates(shapely.centroid(self.polygons)))
 
-    @property
+    @cached_property
     def area(self) -> FloatArray:
         """(n,) areas."""
         return np.asarray(shapely.area(self.polygons))
@@ -119,14 +123,16 @@ def find_motion(old: Shapes, new: Shapes) -> tuple[Motion, float, float]:
     in_place
         The same where nothing moves.
     """
-    sample = _spread(old.area, _SAMPLE)
-    few, tree, area = old.rows(sample), cKDTree(new.centre), new.area
+    few = old.rows(_spread(old.area, _SAMPLE))
+    index = shapely.STRtree(new.polygons)
+    in_place = _covered(IN_PLACE, few, new, index)
+    if in_place >= _SETTLED:
+        return IN_PLACE, in_place, in_place
+    tree, area = cKDTree(new.centre), new.area
     candidates = [IN_PLACE, *_by_extent(old, new), *_by_shape(old, new)]
     rough = np.array([_rough_score(motion, few, tree, area) for motion in candidates])
     finalists = np.argsort(-np.round(rough, 6), kind="stable")[:_LEADERS]
     moving = [_adjusted(candidates[i], few, new, tree) for i in finalists if i > 0]
-    index = shapely.STRtree(new.polygons)
-    in_place = _covered(IN_PLACE, few, new, index)
     scores = [_covered(motion, few, new, index) for motion in moving]
     if not moving:
         return IN_PLACE, in_place, in_place

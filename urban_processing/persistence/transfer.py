@@ -154,8 +154,9 @@ def transfer(old: ParcelsInBlocks, old_id: IntArray, new: ParcelsInBlocks) -> Tr
     >>> transfer(in_blocks(row), np.array([7, 8, 9]), in_blocks(wider)).parcel_id.tolist()
     [7, 8, 9]
     """
-    a, b = _from_west(old.polygons), _from_west(new.polygons)
-    state = _State(old.taken(a), new.taken(b))
+    centres = _centres(old.polygons), _centres(new.polygons)
+    a, b = _from_west(old.polygons, centres[0]), _from_west(new.polygons, centres[1])
+    state = _State(old.taken(a), new.taken(b), (centres[0][a], centres[1][b]))
     state.match_same()
     state.match_in_blocks()
     common = state.match_in_place()
@@ -178,8 +179,10 @@ def transfer(old: ParcelsInBlocks, old_id: IntArray, new: ParcelsInBlocks) -> Tr
 class _State:
     """Matching under way; parcels stand in the order of their places."""
 
-    def __init__(self, old: ParcelsInBlocks, new: ParcelsInBlocks) -> None:
-        self.old, self.new = old, new
+    def __init__(
+        self, old: ParcelsInBlocks, new: ParcelsInBlocks, centres: tuple[FloatArray, FloatArray]
+    ) -> None:
+        self.old, self.new, self.centres = old, new, centres
         m = len(new.polygons)
         self.source = np.full(m, NONE)
         self.nearest = np.full(m, NONE)
@@ -217,15 +220,14 @@ class _State:
         )
         self.motion = match.motions[0]
         self.moved[:] = self.motion.geometry(self.old.polygons)
-        centres = _centres(self.old.polygons), _centres(self.new.polygons)
         for a, b, motion in match.groups():
             points = landmarks_of(match.shapes[0].rows(a), match.shapes[1].rows(b), motion)
             here_old = np.sort(self.old.members(rows[0][a]))
             here_new = np.sort(self.new.members(rows[1][b]))
             if motion is not self.motion:
                 self.moved[here_old] = motion.geometry(self.old.polygons[here_old])
-            before = relative_coordinates(motion.points(centres[0][here_old]), points[0])
-            after = relative_coordinates(centres[1][here_new], points[1])
+            before = relative_coordinates(motion.points(self.centres[0][here_old]), points[0])
+            after = relative_coordinates(self.centres[1][here_new], points[1])
             self._pair(here_old, here_new, before, after)
 
     def _pair(
@@ -263,11 +265,10 @@ def _centres(polygons: ObjectArray) -> FloatArray:
     return np.asarray(shapely.get_coordinates(shapely.centroid(polygons)))
 
 
-def _from_west(polygons: ObjectArray) -> IntArray:
+def _from_west(polygons: ObjectArray, centre: FloatArray) -> IntArray:
     """Rows from west to east, of equal ones from south to north: an order of their own."""
-    centre = np.round(_centres(polygons), 3)
-    area = np.round(shapely.area(polygons), 3)
-    return np.lexsort((area, centre[:, 1], centre[:, 0]))
+    x, y = np.round(centre, 3).T
+    return np.lexsort((np.round(shapely.area(polygons), 3), y, x))
 
 
 def _rows_given(rows: IntArray, order: IntArray) -> IntArray:
