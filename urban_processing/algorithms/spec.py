@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
-from urban_processing.progress import Progress
 from urban_processing.schema import Layer
 
 
@@ -41,6 +40,13 @@ class InputKind(enum.StrEnum):
     over in its place."""
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
+
+    BLOCK_LAYER = "block layer"
+    """Polygons of blocks; handed over as `Blocks`."""
+    BLOCK_STREETS = "lines of streets along blocks"
+    """Streets that belong to a layer of blocks."""
+    SUBDIVISION = "subdivision"
+    """A subdivision made before, as a file; handed over as `Previous`."""
 
     @property
     def of_site(self) -> str:
@@ -172,6 +178,8 @@ class AlgorithmSpec:
         when it is called, so that a list of algorithms costs nothing.
     estimate
         ``estimate(inputs, params)``, where a run may be long.
+    parallel
+        Whether `run` takes a keyword ``executor`` that runs parts of the work side by side.
     references
         The sources, as a reader would look them up.
     examples
@@ -186,8 +194,9 @@ class AlgorithmSpec:
     params: type[Params]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    run: Callable[[Mapping[str, Any], Any, Progress], Mapping[str, Any]]
+    run: Callable[..., Mapping[str, Any]]
     estimate: Callable[[Mapping[str, Any], Any], Estimate] | None = None
+    parallel: bool = False
     references: tuple[str, ...] = ()
     examples: tuple[str, ...] = ()
 
