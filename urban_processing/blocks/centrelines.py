@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from urban_processing.blocks.streets import StreetLines
 from urban_processing.mesh.components import components
-from urban_processing.mesh.places import line_segments, lower_end_first
+from urban_processing.mesh.places import lower_end_first
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.rights_of_way.centrelines import segments_on
 from urban_processing.site import GRID, Issue, snap_to_grid
@@ -85,22 +84,22 @@ def clean_centrelines(
     work = replace(work, line=rows[work.line])
     issues += _crossings(work, lines)
     _tell_doubled(lines, work, snap, issues)
-    work = _without_stubs(work, snap, issues)
+    work = _without_stubs(work, streets.width, snap, issues)
     work = _joined(work, streets.width, snap, issues)
     return _dead_ends(work, issues, kept=dead_ends), issues
 
 
-def _worth_keeping(
-    lines: npt.NDArray[np.object_], snap: float, issues: list[Issue]
-) -> BoolArray:
+def _worth_keeping(lines: npt.NDArray[np.object_], snap: float, issues: list[Issue]) -> BoolArray:
     """Lines that have a length and are no loops smaller than the tolerance."""
     west, south, east, north = shapely.bounds(lines).T
     extent = np.maximum(east - west, north - south)
     tiny = (shapely.length(lines) < GRID) | (shapely.is_closed(lines) & (extent < snap))
     if tiny.any():
-        message = f"{int(tiny.sum())} line(s) without length or loops below {snap:g} m were dropped."
+        message = (
+            f"{int(tiny.sum())} line(s) without length or loops below {snap:g} m were dropped."
+        )
         issues.append(Issue("tiny_lines", message, value=float(tiny.sum()), limit=snap))
-    return ~tiny
+    return np.asarray(~tiny)
 
 
 def _noded(lines: npt.NDArray[np.object_], width: FloatArray) -> Centrelines:
@@ -108,7 +107,7 @@ def _noded(lines: npt.NDArray[np.object_], width: FloatArray) -> Centrelines:
     if not len(lines):
         return Centrelines(np.empty((0, 2, 2)), np.empty(0, dtype=np.int64))
     edges = shapely.get_parts(shapely.union_all(lines, grid_size=GRID))
-    segments, line = segments_on(edges, lines, width)
+    segments, line = segments_on(edges, list(lines), width)
     segments = lower_end_first(segments)
     order = np.lexsort(segments.reshape(-1, 4).T[::-1])
     return Centrelines(segments[order], line[order])
@@ -121,7 +120,7 @@ def _crossings(work: Centrelines, lines: npt.NDArray[np.object_]) -> list[Issue]
     vertices = shapely.get_coordinates(lines)
     known = np.unique(np.concatenate([vertices, at]), axis=0, return_inverse=True)[1].ravel()
     vertex = np.isin(known[len(vertices) :], known[: len(vertices)])
-    found = (degree > 2) & ~vertex  # type: ignore[operator]
+    found = (degree > 2) & ~vertex
     n = int(found.sum())
     if not n:
         return []
@@ -136,25 +135,31 @@ def _tell_doubled(
     if doubled > max(snap, GRID):
         same = len(lines) - len(np.unique(shapely.to_wkb(lines)))
         message = (
-            f"{doubled:.0f} m of lines lie on others and count once, {same} of them whole lines; of "
-            "several the widest counts."
+            f"{doubled:.0f} m of lines lie on others and count once; {same} line(s) are there "
+            "twice. Of several the widest counts."
         )
         issues.append(Issue("streets_doubled", message, value=doubled))
 
 
-def _without_stubs(work: Centrelines, snap: float, issues: list[Issue]) -> Centrelines:
-    """Take away dead ends shorter than `snap`, such as where a line was drawn too far."""
+def _without_stubs(
+    work: Centrelines, width: FloatArray, snap: float, issues: list[Issue]
+) -> Centrelines:
+    """Take away dead ends that go no further than the right-of-way of the street they leave."""
+    widths = width[work.line]
     stubs = []
-    walks = _walks(work, snap) if snap > 0 else {}
-    for end, walk in walks.items():
-        if walk.stopped and walk.length < snap:
+    for end, walk in _walks(work, max(snap, widths.max(initial=0.0) / 2)).items():
+        within = max(snap, widths[walk.onward].max(initial=0.0) / 2)
+        if walk.stopped and walk.length < within:
             stubs.append((end, walk.segments))
     if not stubs:
         return work
     kept = np.ones(len(work.line), dtype=bool)
     for _, segments in stubs:
         kept[segments] = False
-    message = f"{len(stubs)} dead end(s) shorter than {snap:g} m were left out."
+    message = (
+        f"{len(stubs)} dead end(s) shorter than {snap:g} m, or within the right-of-way of the "
+        "street that they leave, were left out."
+    )
     places = _places(work.node_xy[[end for end, _ in stubs]])
     issues.append(
         Issue("stubs_left_out", message, value=float(len(stubs)), limit=snap, geometry=places)
@@ -169,7 +174,13 @@ class _Walk:
     segments: list[int]
     node: int
     length: float
-    stopped: bool
+    onward: list[int]
+    """The other segments at the node."""
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the way ends at a junction or another dead end."""
+        return len(self.onward) != 1
 
 
 def _walks(work: Centrelines, distance: float) -> dict[int, _Walk]:
@@ -182,7 +193,8 @@ def _walks(work: Centrelines, distance: float) -> dict[int, _Walk]:
         for node in pair:
             at.setdefault(node, []).append(segment)
     for end in np.flatnonzero(degree == 1).tolist():
-        node, walked, way = end, 0.0, []
+        node, walked = end, 0.0
+        way: list[int] = []
         while walked < distance:
             onward = [s for s in at[node] if s not in way[-1:]]
             if len(onward) != 1:  # a junction, or the other end
@@ -191,13 +203,11 @@ def _walks(work: Centrelines, distance: float) -> dict[int, _Walk]:
             walked += float(length[onward[0]])
             a, b = ends[onward[0]].tolist()
             node = b if node == a else a
-        out[end] = _Walk(way, node, walked, stopped=len(at[node]) != 2)
+        out[end] = _Walk(way, node, walked, [s for s in at[node] if s not in way[-1:]])
     return out
 
 
-def _joined(
-    work: Centrelines, width: FloatArray, snap: float, issues: list[Issue]
-) -> Centrelines:
+def _joined(work: Centrelines, width: FloatArray, snap: float, issues: list[Issue]) -> Centrelines:
     """Move ends to each other, or onto the nearest other segment, within the tolerance."""
     xy = work.node_xy
     degree = np.bincount(work.ends.ravel(), minlength=len(xy))
@@ -241,7 +251,6 @@ def _onto_segments(
     """Where each end meets the nearest segment within the tolerance that is not its own."""
     if not dead:
         return {}
-    ends = work.ends
     lines = shapely.linestrings(work.segments)
     points = shapely.points(xy[dead])
     k, segment = shapely.STRtree(lines).query(points, predicate="dwithin", distance=snap)
@@ -255,9 +264,7 @@ def _onto_segments(
         if end in out:
             continue
         if end not in own:
-            walk = walks[end]
-            around = np.flatnonzero((ends == walk.node).any(axis=1)).tolist()
-            own[end] = {*walk.segments, *around}
+            own[end] = {*walks[end].segments, *walks[end].onward}
         if s not in own[end]:
             out[end] = _foot(work.segments[s], xy[end], snap)
     return out
@@ -298,4 +305,3 @@ def _dead_ends(work: Centrelines, issues: list[Issue], *, kept: bool) -> Centrel
 
 def _places(xy: FloatArray) -> shapely.MultiPoint:
     return shapely.MultiPoint(xy)
-

@@ -16,6 +16,9 @@ from urban_processing.rights_of_way.centrelines import BESIDE
 ROUNDED_DIGITS = 3
 """Edges that are as near to two kerbs, to this many digits of a metre, lie on the wider street."""
 
+SLACK = 0.05
+"""Kerbs lie half a width beside the centreline up to this share, since buffers are simplified."""
+
 ALIGNED_DEG = 30.0
 """A street along the rim of the land makes at most this angle with it."""
 
@@ -58,7 +61,8 @@ def streets_along(
     width
         (S,) width of each segment.
     margin
-        Metres that a rounded corner or a turning head may lie beyond the kerb.
+        Metres that a rounded corner, a turning head or the cut across a neck may lie beyond the
+        kerb.
     """
     a, b = rings.xy, rings.xy[rings.following]
     middle = (a + b) / 2
@@ -70,7 +74,7 @@ def streets_along(
     lines = shapely.linestrings(work.segments[sides.segment])
     half = width[sides.segment] / 2
     side, edge = shapely.STRtree(points).query(
-        lines, predicate="dwithin", distance=half + max(margin, snap) + BESIDE
+        lines, predicate="dwithin", distance=(1 + SLACK) * half + max(margin, snap) + BESIDE
     )
     own = sides.face[side] == face[rings.edge_block][edge]
     side, edge = side[own], edge[own]
@@ -78,11 +82,9 @@ def streets_along(
     if len(faces.rims):
         rim = shapely.dwithin(shapely.union_all(faces.rims), points, BESIDE)
         way = work.segments[sides.segment][:, 1] - work.segments[sides.segment][:, 0]
-        along = _angle(way[side], (b - a)[edge]) <= ALIGNED_DEG
-        fits = np.where(rim[edge], along & (beyond <= snap), beyond <= margin + BESIDE)
-    else:
-        fits = beyond <= margin + BESIDE
-    side, edge, beyond = side[fits], edge[fits], beyond[fits]
+        along = (beyond <= snap) & (_angle(way[side], (b - a)[edge]) <= ALIGNED_DEG)
+        kept = along | ~rim[edge]
+        side, edge, beyond = side[kept], edge[kept], beyond[kept]
     wide = -width[sides.segment[side]]
     order = np.lexsort((sides.segment[side], wide, np.round(beyond, ROUNDED_DIGITS), edge))
     first, at = np.unique(edge[order], return_index=True)
@@ -93,4 +95,4 @@ def streets_along(
 def _angle(u: FloatArray, v: FloatArray) -> FloatArray:
     """Angle in degrees between the lines along two vectors, 0 to 90."""
     cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    return np.degrees(np.arctan2(cross, np.abs((u * v).sum(axis=1))))
+    return np.asarray(np.degrees(np.arctan2(cross, np.abs((u * v).sum(axis=1)))))

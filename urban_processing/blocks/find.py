@@ -109,7 +109,7 @@ def find_blocks(
         faces,
         sides,
         width=width,
-        margin=max(params.corner_radius, params.turning_radius),
+        margin=max(params.corner_radius, params.turning_radius, params.min_width),
         snap=snap,
     )
     number = street_numbers(work, usable.name)

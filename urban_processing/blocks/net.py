@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.centrelines import Centrelines
+from urban_processing.blocks.necks import neck_lines
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import FloatArray, IntArray
@@ -175,7 +176,12 @@ def net_blocks(
         turning_heads(faces.polygons, faces.rims, work.segments, rank, params.turning_radius),
         corner_radius=params.corner_radius,
     )
-    cut = cut_out(faces.polygons, faces.edges, surfaces, block=np.arange(len(faces.polygons)))
+    each = np.arange(len(faces.polygons))
+    cut = cut_out(faces.polygons, faces.edges, surfaces, block=each)
+    necks = neck_lines(cut.faces[cut.net], params.min_width)
+    if len(necks):
+        surfaces = replace(surfaces, outlines=np.append(surfaces.outlines, necks))
+        cut = cut_out(faces.polygons, faces.edges, surfaces, block=each)
     loose = np.zeros(len(cut.faces), dtype=bool)
     left = np.flatnonzero(cut.net)
     small = shapely.area(cut.faces[left]) < max(params.min_area, GRID)
@@ -189,7 +195,9 @@ def net_blocks(
     return NetBlocks(blocks[order], face[order], *cut.rights_of_way(faces.part)), issues
 
 
-def _issues(cut: Cut, faces: Faces, loose: npt.NDArray[np.bool_], params: BlocksParams) -> list[Issue]:
+def _issues(
+    cut: Cut, faces: Faces, loose: npt.NDArray[np.bool_], params: BlocksParams
+) -> list[Issue]:
     """Say what vanished, what was too small, and what fell apart."""
     issues = []
     n = len(faces.polygons)

@@ -36,7 +36,7 @@ def _same_name(names: StrArray, named: BoolArray) -> IntArray:
     at = np.flatnonzero(named)
     at = at[np.argsort(names[at], kind="stable")]
     same = names[at[1:]] == names[at[:-1]]
-    return np.column_stack([at[:-1], at[1:]])[same]
+    return np.asarray(np.column_stack([at[:-1], at[1:]])[same])
 
 
 def _straight_on(work: Centrelines, named: BoolArray) -> IntArray:

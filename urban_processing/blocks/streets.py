@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -47,7 +47,7 @@ class StreetLines:
     width: FloatArray
     least_width: FloatArray
     off_ground: BoolArray
-    frame: Frame = Frame()
+    frame: Frame = field(default_factory=Frame)
     issues: tuple[Issue, ...] = ()
     input_sha256: str = ""
 
@@ -58,11 +58,8 @@ class StreetLines:
     def take(self, rows: IntArray | BoolArray) -> StreetLines:
         """Return some of the lines."""
         whole = ("frame", "issues", "input_sha256")
-        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in whole}
-        return StreetLines(
-            **{name: values[rows] for name, values in arrays.items()},
-            **{name: getattr(self, name) for name in whole},
-        )
+        names = [f.name for f in fields(self) if f.name not in whole]
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 def street_lines(
@@ -121,9 +118,7 @@ def chosen_streets(streets: StreetLines, params: BlocksParams) -> tuple[StreetLi
             f"{params.default_width:g} m are taken."
         )
         issues.append(
-            Issue(
-                "width_assumed", message, value=float(unknown.sum()), limit=params.default_width
-            )
+            Issue("width_assumed", message, value=float(unknown.sum()), limit=params.default_width)
         )
     width = np.where(np.isnan(kept.width), by_class, kept.width)
     width = np.where(unknown, params.default_width, width)
@@ -136,8 +131,8 @@ def _off_ground(streets: StreetLines) -> list[Issue]:
     if not n:
         return []
     message = (
-        f"{n} line(s) are bridges or tunnels: they take land and cross other streets as if they lay "
-        "on the ground. Leave them out of the input where they should not."
+        f"{n} line(s) are bridges or tunnels: they take land and meet other streets as if they "
+        "lay on the ground. Leave them out of the input where they should not."
     )
     return [Issue("bridges_on_ground", message, value=float(n))]
 
@@ -154,8 +149,4 @@ def _in_order(streets: StreetLines, width: FloatArray) -> StreetLines:
     )
     keys = list(zip(shapely.bounds(lines).tolist(), texts, strict=True))
     order = np.array(sorted(range(len(keys)), key=keys.__getitem__), dtype=np.int64)
-    sorted_ = streets.take(order)
-    return StreetLines(
-        **{f.name: getattr(sorted_, f.name) for f in fields(sorted_)}
-        | {"lines": lines[order], "width": width[order]}
-    )
+    return replace(streets.take(order), lines=lines[order], width=width[order])

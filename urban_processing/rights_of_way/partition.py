@@ -118,9 +118,7 @@ class Cut:
         return polygons, key[:, 1], key[:, 0]
 
 
-def cut_out(
-    parcels: Geometries, edges: Geometries, surfaces: Surfaces, *, block: IntArray
-) -> Cut:
+def cut_out(parcels: Geometries, edges: Geometries, surfaces: Surfaces, *, block: IntArray) -> Cut:
     """Node the boundaries of parcels and street surfaces, and give out the faces between them.
 
     The parameters are those of `partition`.
