@@ -55,6 +55,12 @@ class Centrelines:
         d = self.segments[:, 1] - self.segments[:, 0]
         return np.hypot(d[:, 0], d[:, 1])
 
+    def cut_at(self, edges: npt.NDArray[np.object_]) -> Centrelines:
+        """Return the pieces of noded lines that lie on the segments."""
+        lines = list(shapely.linestrings(self.segments))
+        segments, of = segments_on(edges, lines, np.zeros(len(lines)))
+        return _sorted(segments, self.line[of])
+
     def take(self, kept: BoolArray) -> Centrelines:
         """Return some of the segments."""
         return Centrelines(self.segments[kept], self.line[kept])
@@ -107,7 +113,10 @@ def _noded(lines: npt.NDArray[np.object_], width: FloatArray) -> Centrelines:
     if not len(lines):
         return Centrelines(np.empty((0, 2, 2)), np.empty(0, dtype=np.int64))
     edges = shapely.get_parts(shapely.union_all(lines, grid_size=GRID))
-    segments, line = segments_on(edges, list(lines), width)
+    return _sorted(*segments_on(edges, list(lines), width))
+
+
+def _sorted(segments: FloatArray, line: IntArray) -> Centrelines:
     segments = lower_end_first(segments)
     order = np.lexsort(segments.reshape(-1, 4).T[::-1])
     return Centrelines(segments[order], line[order])

@@ -85,7 +85,7 @@ def find_blocks(
     usable, issues = chosen_streets(streets, params)
     snap = params.snap_tolerance
     work, mended = clean_centrelines(usable, snap=snap, dead_ends=params.dead_ends)
-    faces = find_faces(work, land)
+    work, faces = find_faces(work, land)
     if not len(faces.polygons):
         raise BoundaryError(
             "The streets enclose nothing: blocks need streets that meet, or a land boundary "
@@ -94,7 +94,7 @@ def find_blocks(
         )
     width = usable.width[work.line]
     classes, rank = _ranks(usable.street_class[work.line], params)
-    sides = street_sides(work, width, faces)
+    sides = street_sides(work, width, faces, snap=snap)
     net, lost = net_blocks(work, faces, sides, params, width=width, rank=rank)
     if not len(net.polygons):
         raise BoundaryError(

@@ -10,14 +10,18 @@ from urban_processing.mesh.planar import FloatArray
 
 Geometries = npt.NDArray[np.object_]
 
-SHARPEST = 5.0
-"""Corners are cut where a mitre would be longer than this many half widths: below 23°."""
+MITRE = 1.0
+"""How far a disc reaches into a corner, in half widths from its centre."""
+
+LONG = 2.5
+"""A tail is cut off if half its outline is longer than this many widths; a corner is one below
+about 22°."""
 
 BESIDE_KERB = 0.05
 """Metres by which buffers may miss the outline."""
 
 THICKNESS = 0.2
-"""Tails that no circle of this diameter in metres fits into stay."""
+"""Tails and necks that no circle of this diameter in metres fits into stay."""
 
 BEYOND = 0.5
 """Metres by which the lines go on beyond the outline."""
@@ -26,8 +30,8 @@ BEYOND = 0.5
 def neck_lines(pieces: Geometries, width: float) -> Geometries:
     """Lines across pieces of land where these become narrower than a width.
 
-    What a disc of that diameter does not reach is a tail, as between two carriageways that
-    part, or a neck between two wider pieces; sharp corners are tails only at their very tip.
+    What a disc of that diameter does not reach is a neck between two wider pieces, or a tail, as
+    between two carriageways that part; corners are none unless they are very sharp.
 
     Parameters
     ----------
@@ -38,8 +42,8 @@ def neck_lines(pieces: Geometries, width: float) -> Geometries:
     """
     if width <= 0 or not len(pieces):
         return np.empty(0, dtype=object)
-    inner = shapely.buffer(pieces, -width / 2, join_style="mitre", mitre_limit=SHARPEST)
-    core = shapely.buffer(inner, width / 2, join_style="mitre", mitre_limit=SHARPEST)
+    inner = shapely.buffer(pieces, -width / 2, join_style="mitre", mitre_limit=MITRE)
+    core = shapely.buffer(inner, width / 2 + BESIDE_KERB, join_style="mitre", mitre_limit=MITRE)
     partial = np.flatnonzero(~shapely.is_empty(core))
     tails, of = shapely.get_parts(
         shapely.difference(pieces[partial], core[partial]), return_index=True
@@ -47,14 +51,16 @@ def neck_lines(pieces: Geometries, width: float) -> Geometries:
     thick = ~shapely.is_empty(shapely.buffer(tails, -THICKNESS / 2))
     tails, outline = tails[thick], shapely.boundary(pieces[partial[of[thick]]])
     across = shapely.difference(shapely.boundary(tails), shapely.buffer(outline, BESIDE_KERB))
-    lines = shapely.get_parts(shapely.line_merge(shapely.get_parts(across)))
-    lines = shapely.get_parts(shapely.line_merge(shapely.union_all(lines)))
-    return _prolonged(_straight(lines))
+    lines, tail = shapely.get_parts(shapely.line_merge(across), return_index=True)
+    drawn = shapely.length(lines) > BESIDE_KERB
+    lines, tail = lines[drawn], tail[drawn]
+    is_neck = np.bincount(tail, minlength=len(tails)) > 1
+    is_long = shapely.length(tails) / 2 > LONG * width
+    return _prolonged(_straight(lines[(is_neck | is_long)[tail]]))
 
 
 def _straight(lines: Geometries) -> FloatArray:
-    """(n, 2, 2) both ends of lines, without those that close or have no length."""
-    lines = lines[shapely.length(lines) > BESIDE_KERB]
+    """(n, 2, 2) both ends of lines that do not close."""
     first = shapely.get_coordinates(shapely.get_point(lines, 0))
     last = shapely.get_coordinates(shapely.get_point(lines, -1))
     ends = np.stack([first, last], axis=1)

@@ -76,23 +76,33 @@ class NetBlocks:
     part: IntArray
 
 
-def find_faces(work: Centrelines, land: Sequence[shapely.Polygon] | None) -> Faces:
+def find_faces(
+    work: Centrelines, land: Sequence[shapely.Polygon] | None
+) -> tuple[Centrelines, Faces]:
     """Find the faces between streets, within the land if one is given.
 
     Without land, all that streets enclose is found; pieces of it that share no street are parts.
+
+    Returns
+    -------
+    work
+        The segments, cut where they meet the rims too.
+    faces
+        By place.
     """
-    lines = shapely.linestrings(work.segments)
+    lines = np.asarray(shapely.linestrings(work.segments), dtype=object)
     rims = shapely.boundary(np.array([] if land is None else list(land), dtype=object))
-    edges = np.asarray(lines, dtype=object)
+    edges = lines
     if len(rims):
-        edges = shapely.get_parts(shapely.union_all(np.append(edges, rims), grid_size=GRID))
+        edges = shapely.get_parts(shapely.union_all(np.append(lines, rims), grid_size=GRID))
+        work = work.cut_at(edges)
     cells = shapely.get_parts(shapely.polygonize(edges))
     cells = canonical_rings(cells[_by_place(cells)])
     if land is None:
-        return Faces(cells, _connected(cells, lines), rims, edges)
+        return work, Faces(cells, _connected(cells, lines), rims, edges)
     tree = shapely.STRtree(np.array(list(land), dtype=object))
     cell, part = tree.query(shapely.point_on_surface(cells), predicate="intersects")
-    return Faces(cells[cell], part, rims, edges)
+    return work, Faces(cells[cell], part, rims, edges)
 
 
 def _by_place(polygons: Geometries) -> IntArray:
@@ -120,11 +130,11 @@ def _connected(cells: Geometries, lines: Geometries) -> IntArray:
     return rank[group]
 
 
-def street_sides(work: Centrelines, width: FloatArray, faces: Faces) -> Sides:
+def street_sides(work: Centrelines, width: FloatArray, faces: Faces, *, snap: float) -> Sides:
     """Pairs of a face and a segment on its boundary or within it.
 
-    A street beside the land, whose right-of-way reaches into it, belongs to the faces on the
-    rim that it reaches.
+    A street beside the land, whose right-of-way comes within `snap` metres of it, belongs to the
+    faces on the rim that it reaches.
     """
     middle = shapely.points(work.segments.mean(axis=1))
     segment, face = shapely.STRtree(faces.polygons).query(
@@ -134,7 +144,7 @@ def street_sides(work: Centrelines, width: FloatArray, faces: Faces) -> Sides:
         beside = np.setdiff1d(np.arange(len(middle)), segment)
         lines = shapely.linestrings(work.segments[beside])
         near, reached = shapely.STRtree(faces.polygons).query(
-            lines, predicate="dwithin", distance=width[beside] / 2
+            lines, predicate="dwithin", distance=width[beside] / 2 + snap
         )
         segment = np.append(segment, beside[near])
         face = np.append(face, reached)
