@@ -24,7 +24,7 @@ from qgis.core import (
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind, Output, OutputKind
 from urban_processing.algorithms.words import limits_in_words
 from urban_processing.params import ParamField
-from urban_processing.schema import LAID_OUT, GeometryType, Layer
+from urban_processing.schema import GeometryType, Layer
 
 CRS = "CRS"
 """The CRS to work in, as ``--crs`` on the command line."""
@@ -56,8 +56,10 @@ _SINK_TYPES = {
 }
 """Geometry of the sink of a layer; places stand for areas where a layer has both."""
 
+_GEOPACKAGE = "GeoPackage (*.gpkg)"
 _FILES = {
-    OutputKind.LAYOUT: "GeoPackage (*.gpkg)",
+    OutputKind.LAYOUT: _GEOPACKAGE,
+    OutputKind.LAYERS: _GEOPACKAGE,
     OutputKind.MAP: "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)",
 }
 """Outputs that are single files. An export, a folder of plain files, is none of QGIS's: each
@@ -66,7 +68,7 @@ sink goes to a file of its own."""
 
 @dataclass(frozen=True)
 class SinkName:
-    """A sink: a layer of a layout output."""
+    """A sink: a layer of an output that has several."""
 
     output: Output
     layer: Layer
@@ -94,9 +96,8 @@ def is_given(parameters: Mapping[str, Any], name: str) -> bool:
 def sinks(spec: AlgorithmSpec) -> Iterator[SinkName]:
     """Yield the sinks of an algorithm in the order of asking: those made by default first."""
     for output in spec.outputs:
-        if output.kind is OutputKind.LAYOUT:
-            for layer in sorted(LAID_OUT, key=lambda layer: not layer.shown):
-                yield SinkName(output, layer)
+        for layer in sorted(output.layers, key=lambda layer: not layer.shown):
+            yield SinkName(output, layer)
 
 
 def files(spec: AlgorithmSpec) -> Iterator[Output]:
@@ -162,7 +163,7 @@ def _input(item: Input) -> QgsProcessingParameterDefinition:
         name,
         item.label,
         QgsProcessingParameterFile.Behavior.File,
-        fileFilter=_FILES[OutputKind.LAYOUT],
+        fileFilter=_GEOPACKAGE,
         optional=optional,
     )
     return _helped(file, item.help)

@@ -18,8 +18,8 @@ from urban_processing.layout_file.geopackage import (
     VERSION,
     field_values,
 )
-from urban_processing.metrics.tables import Table
 from urban_processing.schema import ColumnType, GeometryType, Layer
+from urban_processing.tables import Table
 
 _FIELDS = {
     ColumnType.INTEGER: ogr.OFTInteger64,

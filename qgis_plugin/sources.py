@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,12 +76,14 @@ class Sources:
         UrbanError
             With everything that is wrong with them.
         """
+        readers: Mapping[InputKind, Callable[[Input], Any]] = {
+            InputKind.BOUNDARY: self._site,
+            InputKind.LAYOUT: self._layout,
+        }
         inputs: dict[str, Any] = {}
         for item in self.algorithm.spec.inputs:
-            if item.kind is InputKind.BOUNDARY:
-                inputs[item.name] = self._site(item)
-            elif item.kind is InputKind.LAYOUT:
-                inputs[item.name] = self._layout(item)
+            if item.kind in readers:
+                inputs[item.name] = readers[item.kind](item)
         return inputs
 
     def _site(self, item: Input) -> Site | None:

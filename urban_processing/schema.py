@@ -116,7 +116,8 @@ def _boolean(name: str, alias: str, description: str) -> Column:
     return Column(name, ColumnType.BOOLEAN, "", description, alias)
 
 
-_PART = _integer("part", "Part", "Connected piece of the land, counted from 0, largest first.")
+PART = _integer("part", "Part", "Connected piece of the land, counted from 0, largest first.")
+BLOCK_ID = _integer("block_id", "Block", "Number of the block.")
 _PART_OR_ALL = _integer(
     "part", "Part", "Connected piece of the land; empty where the whole is meant.", nullable=True
 )
@@ -128,7 +129,7 @@ PARCELS = Layer(
     GeometryType.POLYGON,
     (
         _PARCEL_ID,
-        _PART,
+        PART,
         _integer("level", "Level", "Number of cuts that made the parcel out of its part."),
         _AREA,
         _real(
@@ -203,7 +204,7 @@ STREETS = Layer(
     (
         _integer("edge_id", "Edge", "Number of the network edge, counted from 1."),
         _integer("street_id", "Street", "Number of the street that the edge belongs to."),
-        _PART,
+        PART,
         _text(
             "class",
             "Class",
@@ -236,7 +237,7 @@ JUNCTIONS = Layer(
     GeometryType.POINT,
     (
         _integer("junction_id", "Junction", "Number of the junction or end, counted from 1."),
-        _PART,
+        PART,
         _text("kind", "Kind", "junction, end or entry."),
         _integer("degree", "Degree", "Number of street edges that meet."),
         _real(
@@ -254,29 +255,29 @@ JUNCTIONS = Layer(
 BOUNDARY = Layer(
     "boundary",
     GeometryType.POLYGON,
-    (_PART, _AREA),
+    (PART, _AREA),
     "Land that was laid out",
 )
 
-INPUT_BOUNDARY = Layer("input_boundary", GeometryType.POLYGON, (_PART, _AREA), "Boundary as given")
+INPUT_BOUNDARY = Layer("input_boundary", GeometryType.POLYGON, (PART, _AREA), "Boundary as given")
 
-OBSTACLES = Layer("obstacles", GeometryType.POLYGON, (_PART, _AREA), "Obstacles")
+OBSTACLES = Layer("obstacles", GeometryType.POLYGON, (PART, _AREA), "Obstacles")
 
-_TRUE_AREA = _real("area_m2", "Area", "Area.", unit="m²")
+TRUE_AREA = _real("area_m2", "Area", "Area.", unit="m²")
 
 RIGHT_OF_WAY = Layer(
     "right_of_way",
     GeometryType.POLYGON,
     (
         _text("class", "Class", "Class of its streets: rim, fixed, collector, local, cul_de_sac."),
-        _PART,
-        _TRUE_AREA,
+        PART,
+        TRUE_AREA,
     ),
     "Right-of-way",
 )
 
 NET_PARCELS = Layer(
-    "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, _PART, _TRUE_AREA), "Net parcels"
+    "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, PART, TRUE_AREA), "Net parcels"
 )
 
 ISSUES = Layer(

@@ -20,11 +20,10 @@ from qgis.core import (
     QgsProcessingParameterNumber,
 )
 
-from urban_processing.algorithms import AlgorithmSpec, InputKind, OutputKind, specs
+from urban_processing.algorithms import AlgorithmSpec, InputKind, specs
 from urban_processing.algorithms.json_schema import description
 from urban_processing.cli.options import command_parameters
 from urban_processing.params import ParamField
-from urban_processing.schema import LAID_OUT
 
 FREE = 1e300
 """QGIS's own limits of a number without limits lie beyond this, or at the ends of 32 bits."""
@@ -72,8 +71,7 @@ def test_names_are_those_of_the_command_line(algorithm: Any, spec: AlgorithmSpec
     }
     asked = {d.name().lower() for d in algorithm.parameterDefinitions()} - sinks
     assert asked - SHELL_ONLY["qgis"] == options
-    layouts = [o.name for o in spec.outputs if o.kind is OutputKind.LAYOUT]
-    assert sinks == {f"{name}_{layer.name}" for name in layouts for layer in LAID_OUT}
+    assert sinks == {f"{o.name}_{layer.name}" for o in spec.outputs for layer in o.layers}
 
 
 def test_defaults_limits_and_helps_are_those_of_the_declaration(

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
 from urban_processing.progress import Progress
+from urban_processing.schema import Layer
 
 
 class InputKind(enum.StrEnum):
@@ -62,10 +63,17 @@ class OutputKind(enum.StrEnum):
 
     LAYOUT = "layout"
     """A `Layout`: a GeoPackage on the command line, sinks in QGIS."""
+    LAYERS = "layers"
+    """A `LayerSet` of the layers in `Output.layers`; stored as a layout is."""
     MAP = "map"
-    """A picture of the layout named in `Output.of`."""
+    """A picture of the layout or layers named in `Output.of`."""
     EXPORT = "export"
-    """A folder of plain files, one for each layer of the layout named in `Output.of`."""
+    """A folder of plain files, one for each layer of what is named in `Output.of`."""
+
+    @property
+    def is_geopackage(self) -> bool:
+        """Whether it is stored as one file with several layers."""
+        return self in (OutputKind.LAYOUT, OutputKind.LAYERS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +120,8 @@ class Output:
     of
         Name of the output that this one is another view of, as a map is of a layout; the
         shell makes it, the algorithm does not.
+    layers
+        Layers that a layout or a set of layers can have.
     """
 
     name: str
@@ -120,6 +130,7 @@ class Output:
     help: str
     required: bool = False
     of: str = ""
+    layers: tuple[Layer, ...] = ()
 
 
 class Estimate(Protocol):
@@ -187,6 +198,9 @@ class AlgorithmSpec:
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
         made = {output.name for output in self.outputs if not output.of}
+        bare = [o.name for o in self.outputs if o.kind.is_geopackage != bool(o.layers)]
+        if bare:
+            raise ValueError(f"{self.name}: layers belong to GeoPackages: {', '.join(bare)}")
         lost = [output.name for output in self.outputs if output.of and output.of not in made]
         if lost:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")

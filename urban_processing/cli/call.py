@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from urban_processing.algorithms.choices import layout_problems
-from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
+from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output
 from urban_processing.cli import stores
 from urban_processing.errors import BoundaryError, UrbanError
 from urban_processing.params.base import Params, option_name
@@ -24,6 +24,10 @@ class Call:
 
     inputs: Mapping[str, Any]
     params: Params
+
+
+_Reader = Callable[[AlgorithmSpec, Input, Mapping[str, Any], list[str]], Any]
+"""Reads an input from what was given; adds to the list what is wrong with it."""
 
 
 def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
@@ -43,10 +47,8 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
     problems += _output_problems(spec, given)
     inputs: dict[str, Any] = {}
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY:
-            inputs[item.name] = _read_boundary(spec, item, given, problems)
-        elif item.kind is InputKind.LAYOUT:
-            inputs[item.name] = _read_layout(spec, item, given, problems)
+        if item.kind in _READERS:
+            inputs[item.name] = _READERS[item.kind](spec, item, given, problems)
     if problems:
         raise BadCallError(problems)
     return Call(inputs, spec.params.from_values(values))
@@ -142,6 +144,13 @@ def _boundary(
     )
 
 
+_READERS: Mapping[InputKind, _Reader] = {
+    InputKind.BOUNDARY: _read_boundary,
+    InputKind.LAYOUT: _read_layout,
+}
+"""What reads an input of a kind; inputs of other kinds are read together with one of these."""
+
+
 def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]:
     problems: list[str] = []
     taken = {
@@ -155,7 +164,8 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
             if output.required:
                 problems.append(f"Say where the result goes: {_flags(output)} FILE.")
             continue
-        problems += stores.problems(output, given)
+        whole = next(o for o in spec.outputs if o.name == (output.of or output.name))
+        problems += stores.problems(output, whole, given)
         place = Path(path).resolve()
         if place in taken:
             problems.append(
@@ -166,7 +176,7 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
 
 
 def _flags(output: Output) -> str:
-    return "-o" if output.kind is OutputKind.LAYOUT else f"--{option_name(output.name)}"
+    return "-o" if output.kind.is_geopackage else f"--{option_name(output.name)}"
 
 
 def _lower_first(sentence: str) -> str:

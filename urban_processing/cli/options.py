@@ -127,7 +127,7 @@ def _writing_options(spec: AlgorithmSpec) -> list[click.Parameter]:
     options: list[click.Parameter] = [
         _option("--overwrite", is_flag=True, panel=OUTPUT, help=replace)
     ]
-    if any(output.kind is OutputKind.LAYOUT for output in spec.outputs):
+    if any(output.kind.is_geopackage for output in spec.outputs):
         seconds = "Record how long the run took; the same seed then no longer gives the same bytes."
         options.append(_option("--record-seconds", is_flag=True, panel=OUTPUT, help=seconds))
     return options
@@ -135,7 +135,7 @@ def _writing_options(spec: AlgorithmSpec) -> list[click.Parameter]:
 
 def _output_options(output: Output) -> list[click.Parameter]:
     flag = f"--{option_name(output.name)}"
-    if output.kind is OutputKind.LAYOUT:
+    if output.kind.is_geopackage:
         return [_file("-o", flag, panel=OUTPUT, help=output.help, note=".gpkg")]
     if output.kind is OutputKind.MAP:
         return [_file(flag, panel=OUTPUT, help=output.help, note=".png, .svg or .pdf")]

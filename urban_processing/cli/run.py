@@ -21,6 +21,7 @@ from urban_processing.progress import MANY_PARCELS
 
 _FILE_NAMES = {
     OutputKind.LAYOUT: "layout",
+    OutputKind.LAYERS: "layers",
     OutputKind.MAP: "picture",
     OutputKind.EXPORT: "export",
 }
@@ -56,6 +57,8 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
             measured = MeasuredLayout(made[output.name])
             rows = [*measured.summary(), *rows]
             broken += [check.message for check in measured.certificate.failures]
+        elif output.kind is OutputKind.LAYERS:
+            rows = [*made[output.name].summary, *rows]
     terminal.table([*rows, *files])
     if broken:
         raise InfeasibleError(

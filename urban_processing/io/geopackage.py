@@ -20,8 +20,8 @@ from urban_processing.layout_file.geopackage import (
     VERSION,
     field_arrays,
 )
-from urban_processing.metrics.tables import Table
 from urban_processing.schema import GeometryType, Layer
+from urban_processing.tables import Table
 
 
 class Pyogrio:

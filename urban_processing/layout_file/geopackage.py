@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from urban_processing.layout_file.styles import layer_style
-from urban_processing.metrics.tables import Table
-from urban_processing.schema import LAYERS, ColumnType, Layer
+from urban_processing.schema import ColumnType, Layer
+from urban_processing.tables import Table
 
 VERSION = "1.3"
 """GeoPackage version: the newest that QGIS 3.22 reads."""
@@ -88,7 +88,12 @@ class LayerLibrary(Protocol):
 
 
 def write_geopackage(
-    path: Path, tables: Mapping[str, Table], *, crs: str, state: str, library: LayerLibrary
+    path: Path,
+    tables: Mapping[Layer, Table],
+    *,
+    crs: str,
+    library: LayerLibrary,
+    state: str | None = None,
 ) -> None:
     """Write tables as the layers of a new GeoPackage, with QGIS styles and column names.
 
@@ -97,18 +102,19 @@ def write_geopackage(
     path
         File to create.
     tables
-        Tables by name of the layer, of layers in the schema; written in its order.
+        Rows of each layer, written in their order.
     crs
         CRS of the geometries as text, "" for none.
-    state
-        JSON kept in the file's metadata, for `read_state`.
     library
         What writes the layers.
+    state
+        JSON kept in the file's metadata, for `read_state`.
     """
-    layers = [layer for layer in LAYERS if layer.name in tables]
-    library.write_layers(path, {layer: tables[layer.name] for layer in layers}, crs=crs)
+    layers = list(tables)
+    library.write_layers(path, tables, crs=crs)
     with closing(sqlite3.connect(path)) as connection, connection:
-        _write_state(connection, state)
+        if state is not None:
+            _write_state(connection, state)
         _write_styles(connection, layers)
         _write_column_names(connection, layers)
 

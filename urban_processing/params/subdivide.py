@@ -45,6 +45,9 @@ MAX_OVER_MIN = 2.5
 WIDTH_SHARES = (0.6, 1.2)
 """Smallest and largest width over √(smallest area), where they are not given."""
 
+SNAP_SHARE = 0.1
+"""Snapping distance over √(smallest area), where it is not given."""
+
 _SIZE, _SHAPE, _SKELETON = "Size", "Shape", "Rows of parcels"
 
 
@@ -193,7 +196,7 @@ class SubdivideParams(Params):
         Param(
             label="Snapping distance",
             help="A cut this near to a vertex of the block's contour goes through it; by default "
-            "0.1·√(smallest parcel).",
+            f"{SNAP_SHARE:g}·√(smallest parcel).",
             unit="m",
             minimum=0,
             advanced=True,

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.blocks.model import BlockRings
+from urban_processing.blocks.model import BlockRings, ragged_rows
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.site import FINE_GRID as FINE_GRID
 
 UintArray = npt.NDArray[np.uint64]
-
-FINE_GRID = 2.0**-28
-"""Spacing in metres of the grid that points added by subdivision are kept on. On the grid of all
-other coordinates, 256 times as coarse, a point on the edge of a block would lie so far beside
-it that areas of a small block's parcels no longer add up to 1e-9 of its own. Coordinates on
-it, too, are shifted to the map and back without loss."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +43,13 @@ class Ground:
     def __len__(self) -> int:
         """Return the number of polygons."""
         return len(self.lineage)
+
+    def of(self, rows: IntArray) -> Ground:
+        """Return some of the polygons."""
+        rings, edges = self.rings.of(rows)
+        return Ground(
+            rings, self.access[edges], self.width[edges], self.street[edges], self.lineage[rows]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +84,10 @@ class Rules:
     by_length: BoolArray
     snap: FloatArray
     corner: FloatArray
+
+    def of(self, rows: IntArray) -> Rules:
+        """Return the rules of some polygons."""
+        return Rules(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,3 +149,24 @@ class Pieces:
             ),
             dtype=object,
         )
+
+
+def sort_faces(pieces: Pieces) -> Pieces:
+    """Put faces into the order of their blocks; those of one block stay in theirs."""
+    order = np.argsort(pieces.block, kind="stable")
+    rings = ragged_rows(np.searchsorted(pieces.face, np.arange(pieces.n_faces + 1)), order)
+    edges = ragged_rows(pieces.offsets, rings)
+    size = np.diff(pieces.offsets)[rings]
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return Pieces(
+        xy=pieces.xy,
+        vertex=pieces.vertex[edges],
+        offsets=np.append(0, np.cumsum(size)),
+        face=rank[pieces.face[rings]],
+        access=pieces.access[edges],
+        block=pieces.block[order],
+        lineage=pieces.lineage[order],
+        level=pieces.level[order],
+        patio=pieces.patio[order],
+    )

@@ -11,7 +11,7 @@ import numpy as np
 
 from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance
-from urban_processing.layout import Layout, Step
+from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.optimization.optimize import optimize_geometry
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
@@ -21,6 +21,7 @@ from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.ground import land_area, lay_ground, settle_islands
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas, set_remnants_aside
