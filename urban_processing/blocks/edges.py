@@ -92,6 +92,34 @@ def streets_along(
     return EdgeStreets(segment)
 
 
+def streets_beside(rings: BlockRings, segments: FloatArray, reach: FloatArray) -> IntArray:
+    """(K,) the nearest segment along each edge of blocks, -1 for none.
+
+    Parameters
+    ----------
+    rings
+        Rings of the blocks.
+    segments
+        (S, 2, 2) ends of segments, sorted.
+    reach
+        (S,) distance in metres from the middle of an edge within which a segment counts; the angle
+        between them is at most `ALIGNED_DEG`.
+    """
+    a, b = rings.xy, rings.xy[rings.following]
+    points = shapely.points((a + b) / 2)
+    lines = shapely.linestrings(segments)
+    segment, edge = shapely.STRtree(points).query(lines, predicate="dwithin", distance=reach)
+    way = segments[:, 1] - segments[:, 0]
+    along = _angle(way[segment], (b - a)[edge]) <= ALIGNED_DEG
+    segment, edge = segment[along], edge[along]
+    away = np.round(shapely.distance(points[edge], lines[segment]), ROUNDED_DIGITS)
+    order = np.lexsort((segment, away, edge))
+    first, at = np.unique(edge[order], return_index=True)
+    out = np.full(len(points), -1)
+    out[first] = segment[order[at]]
+    return out
+
+
 def _angle(u: FloatArray, v: FloatArray) -> FloatArray:
     """Angle in degrees between the lines along two vectors, 0 to 90."""
     cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

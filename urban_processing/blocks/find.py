@@ -112,7 +112,7 @@ def find_blocks(
         margin=max(params.corner_radius, params.turning_radius, params.min_width),
         snap=snap,
     )
-    number = street_numbers(work, usable.name)
+    number = street_numbers(work, usable.name, usable.number)
     at = along.segment
     blocks = Blocks(
         polygons=net.polygons,

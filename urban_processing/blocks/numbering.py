@@ -5,17 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from urban_processing.blocks.centrelines import Centrelines
+from urban_processing.blocks.model import UNKNOWN_STREET
 from urban_processing.blocks.streets import StrArray
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.mesh.straight import go_on_straight, included_angle, pairs_at_nodes
 
 
-def street_numbers(work: Centrelines, name: StrArray) -> IntArray:
-    """(S,) number of the street that each segment is part of, from 1, by place.
+def street_numbers(work: Centrelines, name: StrArray, given: IntArray) -> IntArray:
+    """(S,) number of the street that each segment is part of.
 
-    Segments of one name are one street. Where there is none, a street goes on at a node with the
-    segment that continues it most nearly straight, as strokes do (Thomson and Richardson 1999).
+    Numbers that are given stay; the others follow them, by place. Segments of one name are one
+    street. Where there is none, a street goes on at a node with the segment that continues it most
+    nearly straight, as strokes do (Thomson and Richardson 1999).
 
     Parameters
     ----------
@@ -23,12 +25,18 @@ def street_numbers(work: Centrelines, name: StrArray) -> IntArray:
         Segments.
     name
         (n,) names of their lines, empty where there is none.
+    given
+        (n,) numbers of their lines, `UNKNOWN_STREET` where there is none.
     """
-    n = len(work.line)
-    names = name[work.line]
-    named = names != ""
-    pairs = [_same_name(names, named), _straight_on(work, named)]
-    return components(n, np.concatenate(pairs)) + 1
+    numbers, names = given[work.line], name[work.line]
+    known = numbers != UNKNOWN_STREET
+    named = (names != "") & ~known
+    pairs = [_same_name(names, named), _straight_on(work, named | known)]
+    found = components(len(work.line), np.concatenate(pairs))
+    _, place = np.unique(found[~known], return_inverse=True)
+    out = numbers.copy()
+    out[~known] = numbers.max(initial=0) + 1 + place.ravel()
+    return out
 
 
 def _same_name(names: StrArray, named: BoolArray) -> IntArray:

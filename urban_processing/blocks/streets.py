@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from urban_processing.blocks.model import UNKNOWN_STREET
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.params.blocks import BlocksParams
 from urban_processing.site import Frame, Issue
@@ -33,6 +34,8 @@ class StreetLines:
         (n,) width that the class is at least to give it, such as for its lanes; NaN for none.
     off_ground
         (n,) bridges and tunnels.
+    number
+        (n,) number of the street, `UNKNOWN_STREET` where none is given.
     frame
         Where the local coordinates lie on the map.
     issues
@@ -47,6 +50,7 @@ class StreetLines:
     width: FloatArray
     least_width: FloatArray
     off_ground: BoolArray
+    number: IntArray
     frame: Frame = field(default_factory=Frame)
     issues: tuple[Issue, ...] = ()
     input_sha256: str = ""
@@ -60,6 +64,22 @@ class StreetLines:
         whole = ("frame", "issues", "input_sha256")
         names = [f.name for f in fields(self) if f.name not in whole]
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+
+@dataclass(frozen=True, eq=False)
+class StreetsOnLand:
+    """Centrelines, and the land whose blocks are wanted.
+
+    Parameters
+    ----------
+    streets
+        Lines in the frame of the land.
+    land
+        Polygons, the largest first; None where blocks are what streets enclose.
+    """
+
+    streets: StreetLines
+    land: tuple[shapely.Polygon, ...] | None = None
 
 
 def street_lines(
@@ -84,6 +104,7 @@ def street_lines(
         width=np.array(np.broadcast_to(width, n), dtype=np.float64),
         least_width=np.full(n, np.nan),
         off_ground=np.zeros(n, dtype=bool),
+        number=np.full(n, UNKNOWN_STREET),
     )
 
 
