@@ -133,12 +133,36 @@ def _on_land(
     site = build_site(land, library=library, asked=asked, problems=problems)
     source = land.crs if land.crs is not None else asked
     target = library.from_text(site.frame.crs) if site.frame.crs else None
-    lines, row = _lines(features)
-    mapped = Projection(source, target, library).of(features).geometries(lines)
-    _must_be_finite(mapped, features.name)
-    streets = _street_lines(features, mapped, row, site.frame, [*site.issues])
+    streets = street_lines_in(features, Projection(source, target, library), site.frame)
     digest = layers_digest(site.input_sha256, [features])
-    return StreetsOnLand(replace(streets, input_sha256=digest), site.parts)
+    issues = (*site.issues, *streets.issues)
+    return StreetsOnLand(replace(streets, issues=issues, input_sha256=digest), site.parts)
+
+
+def street_lines_in(features: Features[C], projection: Projection[C], frame: Frame) -> StreetLines:
+    """Return lines in a frame that is known.
+
+    Parameters
+    ----------
+    features
+        Lines; without a CRS they have that of the source of `projection`.
+    projection
+        To the CRS of the frame.
+    frame
+        The frame.
+
+    Raises
+    ------
+    BoundaryError
+        With everything that is wrong with the lines.
+    """
+    problems = wrong_kind(features, "Streets", "line")
+    if problems:
+        raise BoundaryError(problems)
+    lines, row = _lines(features)
+    mapped = projection.of(features).geometries(lines)
+    _must_be_finite(mapped, features.name)
+    return _street_lines(features, mapped, row, frame, [])
 
 
 def _lines(features: Features[Any]) -> tuple[npt.NDArray[np.object_], IntArray]:
