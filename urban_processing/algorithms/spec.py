@@ -42,6 +42,11 @@ class InputKind(enum.StrEnum):
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
 
+    CENTRELINES = "centrelines of streets"
+    """Lines of streets that blocks are found between; handed over as `StreetsOnLand`."""
+    LAND = "polygons of land"
+    """Land that these blocks are cut at; a part of the `StreetsOnLand`."""
+
     @property
     def of_site(self) -> str:
         """Name of the argument of `read_boundary` that takes such an input; empty for others."""

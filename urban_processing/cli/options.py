@@ -17,6 +17,9 @@ INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
 
 Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
+_OPTIONS = (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER, InputKind.LAND)
+"""Inputs, besides those of a site, that are options of a command."""
+
 _UNITS = {"m": "METRES", "m²": "M²", "°": "DEGREES"}
 
 
@@ -87,7 +90,7 @@ def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
 
 
 def _input_parameters(item: Input) -> list[click.Parameter]:
-    if item.kind.of_site or item.kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
+    if item.kind.of_site or item.kind in _OPTIONS:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
     argument = HelpArgument(
         [item.name],
@@ -98,11 +101,7 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
     )
     if item.kind is InputKind.LAYOUT:
         return [argument]
-    place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
-    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
-    return [
-        argument,
-        _option("--place", metavar="NAME", panel=INPUT, help=place),
+    of_file = [
         _option("--layer", metavar="NAME", panel=INPUT, help="Layer of a file that has several."),
         _option(
             "--where",
@@ -110,8 +109,14 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
             panel=INPUT,
             help="Which features to take, as after WHERE in SQL: \"name = 'Schaan'\".",
         ),
-        _option("--crs", metavar="CODE", panel=INPUT, help=crs),
     ]
+    place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
+    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
+    places = []
+    if item.kind is InputKind.BOUNDARY:
+        places = [_option("--place", metavar="NAME", panel=INPUT, help=place)]
+    asked = _option("--crs", metavar="CODE", panel=INPUT, help=crs)
+    return [argument, *places, *of_file, asked]
 
 
 class HelpArgument(click.Argument):

@@ -99,7 +99,8 @@ def _texts(
     if wrong:
         choices = ", ".join(str(member.value) for member in field.kind)  # type: ignore[attr-defined]
         problems.append(
-            f"Column {field.name} must be one of {choices}: {values[wrong[0]]!r} in {called(wrong)}."
+            f"Column {field.name} must be one of {choices}: {values[wrong[0]]!r} in "
+            f"{called(wrong)}."
         )
     return out
 

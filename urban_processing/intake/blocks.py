@@ -226,13 +226,12 @@ def _without_overlaps(
 def _overlap_problems(
     a: IntArray, b: IntArray, shared: ObjectArray, row: IntArray, given_id: IntArray | None
 ) -> list[str]:
-    pairs = sorted(
-        (*sorted((int(row[i]), int(row[j]))), float(shapely.area(g)))
-        for i, j, g in zip(a, b, shared, strict=True)
-    )
-    called = (lambda r: f"row {r + 1}") if given_id is None else (lambda r: f"block {given_id[r]}")
+    first, second = np.minimum(row[a], row[b]), np.maximum(row[a], row[b])
+    pairs = sorted(zip(first.tolist(), second.tolist(), shapely.area(shared).tolist(), strict=True))
+    number = np.arange(1, int(row.max()) + 2) if given_id is None else given_id
+    what = "row" if given_id is None else "block"
     named = "; ".join(
-        f"{called(i)} and {called(j)} ({area:.3g} m²)" for i, j, area in pairs[:MAX_NAMED]
+        f"{what} {number[i]} and {number[j]} ({area:.3g} m²)" for i, j, area in pairs[:MAX_NAMED]
     )
     more = f" and {len(pairs) - MAX_NAMED} more pairs" if len(pairs) > MAX_NAMED else ""
     return [f"Blocks must not overlap: {named}{more}. Correct them, or leave one of each pair out."]
