@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
-from urban_processing.progress import Progress
 from urban_processing.schema import Layer
 
 
@@ -46,6 +45,12 @@ class InputKind(enum.StrEnum):
     """Lines of streets that blocks are found between; handed over as `StreetsOnLand`."""
     LAND = "polygons of land"
     """Land that these blocks are cut at; a part of the `StreetsOnLand`."""
+    BLOCK_LAYER = "block layer"
+    """Polygons of blocks; handed over as `Blocks`."""
+    BLOCK_STREETS = "lines of streets along blocks"
+    """Streets that belong to a layer of blocks."""
+    SUBDIVISION = "subdivision"
+    """A subdivision made before, as a file; handed over as `Previous`."""
 
     @property
     def of_site(self) -> str:
@@ -177,6 +182,8 @@ class AlgorithmSpec:
         when it is called, so that a list of algorithms costs nothing.
     estimate
         ``estimate(inputs, params)``, where a run may be long.
+    parallel
+        Whether `run` takes a keyword ``executor`` that runs parts of the work side by side.
     references
         The sources, as a reader would look them up.
     examples
@@ -191,8 +198,9 @@ class AlgorithmSpec:
     params: type[Params]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    run: Callable[[Mapping[str, Any], Any, Progress], Mapping[str, Any]]
+    run: Callable[..., Mapping[str, Any]]
     estimate: Callable[[Mapping[str, Any], Any], Estimate] | None = None
+    parallel: bool = False
     references: tuple[str, ...] = ()
     examples: tuple[str, ...] = ()
 

@@ -17,9 +17,6 @@ INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
 
 Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
-_OPTIONS = (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER, InputKind.LAND)
-"""Inputs, besides those of a site, that are options of a command."""
-
 _UNITS = {"m": "METRES", "m²": "M²", "°": "DEGREES"}
 
 
@@ -42,6 +39,19 @@ def command_parameters(spec: AlgorithmSpec) -> list[click.Parameter]:
     parameters += _writing_options(spec)
     for panel, fields in spec.panels().items():
         parameters += [parameter_option(field, panel) for field in fields]
+    if spec.parallel:
+        side_by_side = "Number of processes that work side by side; the result is the same."
+        parameters.append(
+            _option(
+                "--processes",
+                metavar="N",
+                type=click.IntRange(min=1),
+                default=1,
+                panel=OTHER,
+                help=side_by_side,
+                note="at least 1; default 1",
+            )
+        )
     quiet = "Say nothing but warnings and errors."
     parameters.append(_option("--quiet", "-q", is_flag=True, panel=OTHER, help=quiet))
     return parameters
@@ -89,8 +99,18 @@ def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
     return _option(*flags, type=click.Path(), metavar=metavar, **kwargs)
 
 
+_BY_OPTION = (
+    InputKind.PARCEL_LAYER,
+    InputKind.STREET_LAYER,
+    InputKind.BLOCK_STREETS,
+    InputKind.SUBDIVISION,
+    InputKind.LAND,
+)
+"""Inputs that are options; the others are arguments."""
+
+
 def _input_parameters(item: Input) -> list[click.Parameter]:
-    if item.kind.of_site or item.kind in _OPTIONS:
+    if item.kind.of_site or item.kind in _BY_OPTION:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
     argument = HelpArgument(
         [item.name],
@@ -101,7 +121,19 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
     )
     if item.kind is InputKind.LAYOUT:
         return [argument]
-    of_file = [
+    if item.kind is not InputKind.BOUNDARY:
+        return [argument, *_choice_of_features()]
+    place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
+    return [
+        argument,
+        _option("--place", metavar="NAME", panel=INPUT, help=place),
+        *_choice_of_features(),
+    ]
+
+
+def _choice_of_features() -> list[click.Parameter]:
+    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
+    return [
         _option("--layer", metavar="NAME", panel=INPUT, help="Layer of a file that has several."),
         _option(
             "--where",
@@ -109,14 +141,8 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
             panel=INPUT,
             help="Which features to take, as after WHERE in SQL: \"name = 'Schaan'\".",
         ),
+        _option("--crs", metavar="CODE", panel=INPUT, help=crs),
     ]
-    place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
-    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
-    places = []
-    if item.kind is InputKind.BOUNDARY:
-        places = [_option("--place", metavar="NAME", panel=INPUT, help=place)]
-    asked = _option("--crs", metavar="CODE", panel=INPUT, help=crs)
-    return [argument, *places, *of_file, asked]
 
 
 class HelpArgument(click.Argument):

@@ -17,7 +17,7 @@ from urban_processing.cli import stores
 from urban_processing.cli.call import Call, prepare
 from urban_processing.cli.terminal import Terminal
 from urban_processing.errors import InfeasibleError
-from urban_processing.progress import MANY_PARCELS
+from urban_processing.progress import MANY_PARCELS, Progress
 
 _FILE_NAMES = {
     OutputKind.LAYOUT: "layout",
@@ -44,7 +44,7 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
         _announce(spec.estimate(call.inputs, call.params), terminal)
     started = time.perf_counter()
     with terminal.progress(spec.title) as progress:
-        made = spec.run(call.inputs, call.params, progress)
+        made = _run(spec, call, progress, given)
     rows = [("time", duration_in_words(time.perf_counter() - started))]
     files = []
     for output in spec.outputs:
@@ -64,6 +64,17 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
         raise InfeasibleError(
             ["The layout was written, but not all that it promises holds:", *broken]
         )
+
+
+def _run(
+    spec: AlgorithmSpec, call: Call, progress: Progress, given: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    if not spec.parallel or given["processes"] == 1:
+        return spec.run(call.inputs, call.params, progress)
+    from urban_processing.processes import process_pool
+
+    with process_pool(given["processes"]) as executor:
+        return spec.run(call.inputs, call.params, progress, executor=executor)
 
 
 def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) -> None:

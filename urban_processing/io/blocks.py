@@ -16,7 +16,9 @@ from urban_processing.intake.features import Features
 from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
 from urban_processing.io.crs import PYPROJ, asked_crs
 from urban_processing.io.features import Source, read_features
+from urban_processing.io.layouts import layer_in
 from urban_processing.params.subdivide import SubdivideParams
+from urban_processing.schema import BLOCK_EDGES, BLOCKS
 
 
 def read_streets(
@@ -67,9 +69,11 @@ def read_blocks(
     Parameters
     ----------
     source
-        Polygons: a file, a GeoDataFrame, a GeoSeries or shapely geometries.
+        Polygons: a file, a GeoDataFrame, a GeoSeries or shapely geometries. Of a file of blocks its
+        layer ``blocks`` is read.
     streets
-        Lines along the blocks, likewise, that say how wide the streets are.
+        Lines along the blocks, likewise, that say how wide the streets are; by default the layer
+        ``block_edges`` of a file that has one.
     layer, where
         Layer of a file of blocks, and which features of it.
     crs
@@ -84,6 +88,10 @@ def read_blocks(
     """
     problems: list[str] = []
     asked = asked_crs(crs, problems)
+    if streets is None:
+        streets = _own_edges(source)
+    if layer is None:
+        layer = layer_in(source, BLOCKS.name)
     polygons = _read(
         source, "Blocks", "polygon", block_columns(), problems, layer=layer, where=where
     )
@@ -93,6 +101,15 @@ def read_blocks(
     return build_blocks(
         polygons, library=PYPROJ, asked=asked, streets=lines, params=params, problems=problems
     )
+
+
+def _own_edges(source: Source) -> str | None:
+    """The layer of edges in a file of blocks, as a source of its own; None where it has none."""
+    if not isinstance(source, str | PathLike):
+        return None
+    path = fspath(source).partition("|layername=")[0]
+    edges = layer_in(path, BLOCK_EDGES.name)
+    return None if edges is None else f"{path}|layername={edges}"
 
 
 def _read(

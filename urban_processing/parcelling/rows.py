@@ -27,7 +27,8 @@ from urban_processing.parcelling.divided import (
     whole,
 )
 from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.slices import Bounds, Slicer, rings_of_lots
+from urban_processing.parcelling.slices import Slicer, rings_of_lots
+from urban_processing.parcelling.spacing import Bounds
 from urban_processing.parcelling.streets import logical_streets, sides_of_rings
 from urban_processing.parcelling.strips import Strip, alpha_strips
 from urban_processing.parcelling.tidy import divide_large, tidy

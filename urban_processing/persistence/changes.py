@@ -17,8 +17,9 @@ ObjectArray = npt.NDArray[np.object_]
 SAME = 1e-3
 """A parcel is the same while what it lost and gained is no more than this share of its area."""
 
-MOST = 0.5
-"""A parcel comes out of another, or went into it, with more than this share of its area."""
+MOST = 0.5 + 1e-6
+"""A parcel comes out of another, or went into it, with more than this share of its area: more than
+half, by so much that rounding decides nothing where a parcel is cut in equal halves."""
 
 
 class Change(enum.StrEnum):
@@ -80,6 +81,8 @@ class Overlaps:
         (q,) in m².
     area_old, area_new
         (n,) and (m,) areas of the parcels, old ones after they were moved along.
+    still
+        (n,) old parcels that did not have to be moved along.
     """
 
     old: IntArray
@@ -87,6 +90,7 @@ class Overlaps:
     area: FloatArray
     area_old: FloatArray
     area_new: FloatArray
+    still: BoolArray
 
     def of(self, old: IntArray, new: IntArray) -> FloatArray:
         """(r,) area in common of given pairs."""
@@ -115,22 +119,31 @@ class Overlaps:
         return self.old[half], self.new[half]
 
 
-def overlaps(old: ObjectArray, new: ObjectArray, rows: tuple[IntArray, IntArray]) -> Overlaps:
+def overlaps(
+    old: ObjectArray, new: ObjectArray, rows: tuple[IntArray, IntArray], *, still: BoolArray
+) -> Overlaps:
     """Measure what some old parcels, moved along, and some new ones have in common.
 
     Parameters
     ----------
     old, new
-        (n,) and (m,) all parcels.
+        (n,) and (m,) all parcels, old ones where they were moved along to.
     rows
         Those that are looked at.
+    still
+        (n,) old parcels that did not have to be moved along.
     """
     before, after = old[rows[0]], new[rows[1]]
     a, b = shapely.STRtree(after).query(before, predicate="intersects")
     area = shapely.area(shapely.intersection(before[a], after[b]))
     some = area > 0
     return Overlaps(
-        rows[0][a[some]], rows[1][b[some]], area[some], shapely.area(old), shapely.area(new)
+        rows[0][a[some]],
+        rows[1][b[some]],
+        area[some],
+        shapely.area(old),
+        shapely.area(new),
+        still,
     )
 
 
@@ -161,8 +174,8 @@ def _of_new(source: IntArray, same: BoolArray, distance: FloatArray, common: Ove
     fresh = source[part] == NONE
     old[part[fresh]] = whole[fresh]
     area = np.where(same, common.area_new, common.of(old, rows))
-    apart = common.area_old[old] + common.area_new - 2 * area
-    kept = same | (apart <= SAME * common.area_new)
+    apart = np.append(common.area_old, np.inf)[old] + common.area_new - 2 * area
+    kept = same | ((apart <= SAME * common.area_new) & np.append(common.still, False)[old])
     change = np.where(kept, Change.KEPT.value, Change.MOVED.value).astype("U6")
     change[source == NONE] = Change.SPLIT.value
     change[old == NONE] = Change.NEW.value
@@ -170,7 +183,9 @@ def _of_new(source: IntArray, same: BoolArray, distance: FloatArray, common: Ove
 
 
 def _of_ended(source: IntArray, common: Overlaps) -> Changes:
-    ended = np.setdiff1d(np.arange(len(common.area_old)), source)
+    goes_on = np.zeros(len(common.area_old) + 1, dtype=bool)
+    goes_on[source] = True
+    ended = np.flatnonzero(~goes_on[:-1])
     new = np.full(len(common.area_old), NONE)
     part, whole = common.most_of_old()
     new[part] = whole

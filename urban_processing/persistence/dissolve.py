@@ -12,8 +12,6 @@ from urban_processing.mesh.planar import IntArray
 TOUCH = 0.01
 """Parcels that come this near to each other, in metres, touch."""
 
-_LOST = 1e-6
-
 
 def touching(polygons: npt.NDArray[np.object_]) -> IntArray:
     """(n,) group of each polygon; polygons that touch, and those that touch these, are one."""
@@ -27,10 +25,9 @@ def dissolved(polygons: npt.NDArray[np.object_]) -> shapely.Polygon:
     Parcels that share vertices are joined quickly; where they do not fit, they are joined with
     what lies between.
     """
-    joined = shapely.coverage_union_all(polygons)
-    area = shapely.area(polygons).sum()
-    fits = shapely.is_valid(joined) and abs(joined.area - area) <= _LOST * area
-    if not fits or joined.geom_type != "Polygon":
+    if shapely.coverage_is_valid(polygons):
+        joined = shapely.coverage_union_all(polygons)
+    else:
         wider = shapely.union_all(shapely.buffer(polygons, TOUCH, join_style="mitre"))
         joined = shapely.buffer(wider, -TOUCH, join_style="mitre")
-    return joined if joined.geom_type == "Polygon" else shapely.convex_hull(joined)
+    return joined if joined.geom_type == "Polygon" else joined.convex_hull

@@ -12,8 +12,9 @@ from scipy.spatial.distance import cdist
 from urban_processing.mesh.planar import FloatArray, IntArray
 
 TOO_FAR = 1.0
-"""No match beyond this many times the distance to the next parcel of the same layout: what is
-farther away than a neighbour is another parcel. On 40 random edits of a small network, 1.5 carries
+"""No match beyond this many times the spacing of parcels, the mean of the distances from the old
+one to its nearest neighbour before and from the new one to its nearest after: what is farther
+away than a neighbour is another parcel. On 40 random edits of a small network, 1.5 carries
 3 % more numbers on, two in three of them to parcels with little in common with the old ones."""
 
 _DENSE = 1_000_000
@@ -61,10 +62,9 @@ def assign(old: FloatArray, new: FloatArray) -> tuple[IntArray, IntArray, FloatA
     """Find which new position is which old one.
 
     Each position is used once. Of all ways to do so the one is taken that gains most, where a
-    pair gains what its distance d stays below the limit for it: on the same edits that carries
-    1 % more numbers on than nearest first, to parcels with as much in common. The limit is `TOO_FAR` times
-    the spacing: the distance from the old parcel to its nearest neighbour before, or from the
-    new one to its nearest after, whichever is larger.
+    pair gains what its distance d stays below the limit (`TOO_FAR`). On random edits that
+    carries 1 % more numbers on than pairing the nearest first, to parcels that have as much in
+    common. A parcel alone in its block, before or after, has no limit.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def assign(old: FloatArray, new: FloatArray) -> tuple[IntArray, IntArray, FloatA
     if len(old) * len(new) > _DENSE:
         return _assign_sparse(old, new)
     distance = position_distances(old, new)
-    gain = np.maximum(_gain(distance, _spacing(old)[:, None], _spacing(new)[None, :]), 0.0)
+    gain = np.maximum(_gain(distance, _spacing(old)[:, None], _spacing(new)[None]), 0.0)
     a, b = linear_sum_assignment(gain, maximize=True)
     good = gain[a, b] > 0
     return a[good], b[good], distance[a[good], b[good]]
@@ -98,9 +98,10 @@ def _spacing(positions: FloatArray) -> FloatArray:
 
 
 def _gain(distance: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:
-    """By how much distances stay below the limit that the spacings set; a lone one has none."""
-    limit = TOO_FAR * np.maximum(old, new)
-    return np.asarray(np.where(np.isinf(limit), distance.max() + 1.0, limit) - distance)
+    """By how much distances stay below the limit that the spacings before and after set."""
+    spacing = 0.5 * (old + new)
+    limit = np.where(np.isinf(spacing), distance.max() + 1.0, TOO_FAR * spacing)
+    return np.asarray(limit - distance)
 
 
 def _assign_sparse(old: FloatArray, new: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
@@ -121,7 +122,8 @@ def _assign_sparse(old: FloatArray, new: FloatArray) -> tuple[IntArray, IntArray
         ),
         shape=(len(new), len(old) + len(new)),
     )
-    b, a = min_weight_full_bipartite_matching(cost)
-    real = a < len(old)
-    a, b = np.asarray(a[real], dtype=np.int64), np.asarray(b[real], dtype=np.int64)
+    rows_new, columns = min_weight_full_bipartite_matching(cost)
+    real = columns < len(old)
+    a: IntArray = np.array(columns[real], dtype=np.int64)
+    b: IntArray = np.array(rows_new[real], dtype=np.int64)
     return a, b, np.round(np.abs(old[a] - new[b]).sum(axis=1), _ROUNDING)

@@ -190,6 +190,7 @@ class _State:
         self.distance = np.full(m, np.nan)
         self.motion = Motion(np.eye(2), np.zeros(2))
         self.moved = old.polygons.copy()
+        self.still = np.ones(len(old.polygons), dtype=bool)
         self.used = np.zeros(len(old.polygons), dtype=bool)
         self.unsettled = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
@@ -220,12 +221,14 @@ class _State:
         )
         self.motion = match.motions[0]
         self.moved[:] = self.motion.geometry(self.old.polygons)
+        self.still[:] = self.motion.is_none
         for a, b, motion in match.groups():
             points = landmarks_of(match.shapes[0].rows(a), match.shapes[1].rows(b), motion)
             here_old = np.sort(self.old.members(rows[0][a]))
             here_new = np.sort(self.new.members(rows[1][b]))
             if motion is not self.motion:
                 self.moved[here_old] = motion.geometry(self.old.polygons[here_old])
+                self.still[here_old] = motion.is_none
             before = relative_coordinates(motion.points(self.centres[0][here_old]), points[0])
             after = relative_coordinates(self.centres[1][here_new], points[1])
             self._pair(here_old, here_new, before, after)
@@ -254,7 +257,7 @@ class _State:
 
     def match_in_place(self) -> Overlaps:
         """Pair what is left where it is in place; return what parcels have in common."""
-        common = overlaps(self.moved, self.new.polygons, self.unsettled)
+        common = overlaps(self.moved, self.new.polygons, self.unsettled, still=self.still)
         a, b = common.most_of_both()
         free = (self.source[b] == NONE) & ~self.used[a]
         self._carry(a[free], b[free])
