@@ -102,7 +102,8 @@ def ground_of_blocks(blocks: Blocks) -> Ground:
         access=blocks.edge_access,
         width=blocks.edge_width,
         street=blocks.edge_street,
-        lineage=splitmix64(blocks.block_id.astype(np.uint64)),
+        # far from the ranks that children are told apart by
+        lineage=splitmix64(blocks.block_id.astype(np.uint64) + np.uint64(2**32)),
     )
 
 
