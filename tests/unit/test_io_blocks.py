@@ -123,9 +123,9 @@ def test_streets_must_be_lines_with_a_crs() -> None:
         read_streets(frame(TWO))
     with pytest.raises(BoundaryError, match="has no CRS"):
         read_streets(frame([line((0, 0), (9, 0))], crs=None))
+    with np.errstate(invalid="ignore"):
+        lines = frame([shapely.LineString([(0, 0), (math.nan, 3)])])
     with pytest.raises(BoundaryError, match="not finite"):
-        with np.errstate(invalid="ignore"):
-            lines = frame([shapely.LineString([(0, 0), (math.nan, 3)])])
         read_streets(lines)
 
 

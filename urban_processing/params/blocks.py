@@ -30,14 +30,14 @@ class BlocksParams(Params):
         ),
     ] = 12.0
     class_widths: Annotated[
-        str,
+        str | None,
         Param(
             label="Widths by class",
             help="Widths of rights-of-way by class, besides those known: residential=14, "
             "main road=28.",
             group=_WIDTHS,
         ),
-    ] = ""
+    ] = None
     footpaths: Annotated[
         bool,
         Param(
@@ -66,27 +66,6 @@ class BlocksParams(Params):
             group=_LINES,
         ),
     ] = 1.0
-    corner_radius: Annotated[
-        float,
-        Param(
-            label="Corner radius",
-            help="Radius that rounds the corners of blocks; 0 leaves them as corners, which "
-            "subdivision into parcels needs.",
-            unit="m",
-            minimum=0,
-            group=_BLOCKS,
-        ),
-    ] = 0.0
-    turning_radius: Annotated[
-        float,
-        Param(
-            label="Turning radius",
-            help="Radius of turning heads at dead ends; 0 for none.",
-            unit="m",
-            minimum=0,
-            group=_BLOCKS,
-        ),
-    ] = 0.0
     min_area: Annotated[
         float,
         Param(
@@ -108,6 +87,27 @@ class BlocksParams(Params):
             group=_BLOCKS,
         ),
     ] = 6.0
+    corner_radius: Annotated[
+        float,
+        Param(
+            label="Corner radius",
+            help="Radius that rounds the corners of blocks; 0 leaves them as corners, which "
+            "subdivision into parcels needs.",
+            unit="m",
+            minimum=0,
+            advanced=True,
+        ),
+    ] = 0.0
+    turning_radius: Annotated[
+        float,
+        Param(
+            label="Turning radius",
+            help="Radius of turning heads at dead ends; 0 for none.",
+            unit="m",
+            minimum=0,
+            advanced=True,
+        ),
+    ] = 0.0
 
     @property
     def width_m(self) -> Mapping[str, float]:
@@ -125,11 +125,12 @@ class BlocksParams(Params):
         ]
 
 
-def _table(text: str) -> tuple[dict[str, float], list[str]]:
+def _table(text: str | None) -> tuple[dict[str, float], list[str]]:
     """Widths by class, and the entries that say none."""
     out: dict[str, float] = {}
     wrong = []
-    for entry in filter(None, (piece.strip() for piece in text.replace(";", ",").split(","))):
+    pieces = (text or "").replace(";", ",").split(",")
+    for entry in filter(None, (piece.strip() for piece in pieces)):
         name, _, number = entry.rpartition("=")
         try:
             width = float(number)
