@@ -44,6 +44,8 @@ _LAYERS = {
     InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.CENTRELINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
 }
 """Inputs that are layers, and their geometry."""
 
@@ -130,7 +132,7 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     for field in plain:
         if field not in first:
             yield _parameter(field)
-    if input_of(spec, InputKind.BOUNDARY):
+    if input_of(spec, InputKind.BOUNDARY) or input_of(spec, InputKind.CENTRELINES):
         crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)
         yield _helped(crs, _CRS_HELP)
     for field in fields:

@@ -94,11 +94,15 @@ def _say_what_inputs_say(
 ) -> None:
     """Say which CRS is worked in, and what was repaired or changed in reading a boundary."""
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY and inputs[item.name] is not None:
-            site = inputs[item.name]
-            for issue in site.issues:
+        read = inputs.get(item.name)
+        if item.kind is InputKind.CENTRELINES and read is not None:
+            read = read.streets
+        elif item.kind is not InputKind.BOUNDARY:
+            continue
+        if read is not None:
+            for issue in read.issues:
                 feedback.pushInfo(in_qgis(issue.message))
-            crs = crs_of(site.frame.crs)
+            crs = crs_of(read.frame.crs)
             feedback.pushInfo(f"CRS of the results: {crs.userFriendlyIdentifier()}.")
 
 

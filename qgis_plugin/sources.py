@@ -28,11 +28,13 @@ from qgis_plugin.feedback import stop_if_cancelled
 from qgis_plugin.geopackage import OGR
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
 from urban_processing.algorithms.choices import layout_problems
+from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
 from urban_processing.intake.sites import build_site
+from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
 from urban_processing.site import Site
@@ -79,6 +81,7 @@ class Sources:
         readers: Mapping[InputKind, Callable[[Input], Any]] = {
             InputKind.BOUNDARY: self._site,
             InputKind.LAYOUT: self._layout,
+            InputKind.CENTRELINES: self._streets,
         }
         inputs: dict[str, Any] = {}
         for item in self.algorithm.spec.inputs:
@@ -97,11 +100,10 @@ class Sources:
             if kind.of_site
             for layer in (input_of(self.algorithm.spec, kind),)
         }
-        asked = self.algorithm.parameterAsCrs(self.parameters, CRS, self.context)
         return build_site(
             features,
             library=QgisCrs(self.context.transformContext()),
-            asked=asked if asked.isValid() else None,
+            asked=self._asked_crs(),
             corners=layers[InputKind.CORNER_POINTS],
             given=GivenLayers(
                 fixed_streets=layers[InputKind.FIXED_STREETS],
@@ -111,6 +113,25 @@ class Sources:
                 entries=layers[InputKind.ENTRY_POINTS],
             ),
         )
+
+    def _streets(self, item: Input) -> StreetsOnLand | None:
+        """Read centrelines, and the land they are on."""
+        features = self._features(item, STREET_COLUMNS)
+        if features is None:
+            return None
+        self.name = self.name or features.name
+        land = input_of(self.algorithm.spec, InputKind.LAND)
+        return build_streets(
+            features,
+            library=QgisCrs(self.context.transformContext()),
+            asked=self._asked_crs(),
+            land=None if land is None else self._features(land),
+        )
+
+    def _asked_crs(self) -> QgsCoordinateReferenceSystem | None:
+        """Return the CRS to work in, if one was given."""
+        asked = self.algorithm.parameterAsCrs(self.parameters, CRS, self.context)
+        return asked if asked.isValid() else None
 
     def _layout(self, item: Input) -> Layout | None:
         """Read a layout, from its file or from two layers."""
@@ -141,7 +162,9 @@ class Sources:
         crs = QgisCrs(self.context.transformContext())
         return build_layout(*found, library=crs, snap=snap or 0.0)
 
-    def _features(self, item: Input) -> Features[QgsCoordinateReferenceSystem] | None:
+    def _features(
+        self, item: Input, wanted: Sequence[str] = GIVEN_COLUMNS
+    ) -> Features[QgsCoordinateReferenceSystem] | None:
         """Read a layer, or the features of it that are selected; None where none is given."""
         name = parameter_name(item.name)
         source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
@@ -152,7 +175,7 @@ class Sources:
                 )
             return None
         known = source.fields().names()
-        columns = [column for column in GIVEN_COLUMNS if column in known]
+        columns = [column for column in wanted if column in known]
         rows = self._rows(source, name, columns)
         return Features(
             _objects([geometry for geometry, _ in rows]),

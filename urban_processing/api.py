@@ -8,15 +8,19 @@ from typing import Any
 
 import numpy.typing as npt
 
+from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
+from urban_processing.io.blocks import read_streets
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_layout
-from urban_processing.io.frames import GeoLayout
+from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.layouts import read_layers
 from urban_processing.layout import Layout
+from urban_processing.params.blocks import BlocksParams
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.pipelines import blocks as block_finding
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
 from urban_processing.pipelines.ground import given_layers
@@ -158,6 +162,76 @@ def optimize(
     params = OptimizeParams.from_values(parameters)
     given = _layout(layout, parcels, streets, params)
     return GeoLayout(optimization.optimize(given, params, progress))
+
+
+def find_blocks(
+    streets: Source | StreetsOnLand,
+    *,
+    land: Source | None = None,
+    layer: str | None = None,
+    where: str | None = None,
+    crs: object = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Find the blocks between streets, less the land that the streets take.
+
+    Parameters
+    ----------
+    streets
+        Centrelines: a file, GeoDataFrame, GeoSeries or shapely lines; their columns may say width,
+        class and name.
+    land, layer, where, crs
+        As in `urban_processing.io.blocks.read_streets`.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `BlocksParams`.
+
+    Returns
+    -------
+    GeoLayers
+        ``blocks``, ``block_edges`` with the streets along them, ``right_of_way`` and ``issues``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong; an `UrbanError` where both streets and parameters are.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling. Section 3.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> streets = [shapely.box(0, 0, 90, 60).exterior, shapely.LineString([(40, 0), (40, 60)])]
+    >>> found = find_blocks(streets, default_width=10)
+    >>> found.blocks.area_m2.tolist()
+    [1500.0, 2000.0]
+    """
+    errors: list[UrbanError] = []
+    params, ground = None, None
+    try:
+        params = BlocksParams.from_values(parameters)
+    except ParameterError as error:
+        errors.append(error)
+    try:
+        ground = _streets(streets, land=land, layer=layer, where=where, crs=crs)
+    except BoundaryError as error:
+        errors.append(error)
+    if params is None or ground is None:
+        raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
+    return GeoLayers(block_finding.blocks(ground, params, progress))
+
+
+def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
+    if not isinstance(source, StreetsOnLand):
+        return read_streets(source, **options)
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise BoundaryError(f"Streets are ready as they are: leave out {', '.join(given)}.")
+    return source
 
 
 def _layout(

@@ -41,6 +41,10 @@ class InputKind(enum.StrEnum):
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
 
+    CENTRELINES = "centrelines of streets"
+    """Lines of streets that blocks are found between; handed over as `StreetsOnLand`."""
+    LAND = "polygons of land"
+    """Land that these blocks are cut at; a part of the `StreetsOnLand`."""
     BLOCK_LAYER = "block layer"
     """Polygons of blocks; handed over as `Blocks`."""
     BLOCK_STREETS = "lines of streets along blocks"

@@ -144,9 +144,33 @@ def _boundary(
     )
 
 
+def _read_centrelines(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read streets and the land they are on; None where that failed."""
+    if given[item.name] is None:
+        problems.append(f"Give {option_name(item.name).upper()}, a file with lines of streets.")
+        return None
+    from urban_processing.io.blocks import read_streets
+
+    land = next((given[i.name] for i in spec.inputs if i.kind is InputKind.LAND), None)
+    try:
+        return read_streets(
+            given[item.name],
+            land=land,
+            layer=given["layer"],
+            where=given["where"],
+            crs=given["crs"],
+        )
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
 _READERS: Mapping[InputKind, _Reader] = {
     InputKind.BOUNDARY: _read_boundary,
     InputKind.LAYOUT: _read_layout,
+    InputKind.CENTRELINES: _read_centrelines,
 }
 """What reads an input of a kind; inputs of other kinds are read together with one of these."""
 

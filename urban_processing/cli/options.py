@@ -104,6 +104,7 @@ _BY_OPTION = (
     InputKind.STREET_LAYER,
     InputKind.BLOCK_STREETS,
     InputKind.SUBDIVISION,
+    InputKind.LAND,
 )
 """Inputs that are options; the others are arguments."""
 

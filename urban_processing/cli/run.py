@@ -83,6 +83,9 @@ def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) ->
         if item.kind is InputKind.BOUNDARY:
             for issue in call.inputs[item.name].issues:
                 terminal.note(issue.message)
+        elif item.kind is InputKind.CENTRELINES:
+            for issue in call.inputs[item.name].streets.issues:
+                terminal.note(issue.message)
 
 
 def _announce(estimate: Estimate, terminal: Terminal) -> None:
