@@ -46,6 +46,8 @@ _LAYERS = {
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
     InputKind.CENTRELINES: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
 }
 """Inputs that are layers, and their geometry."""
 
@@ -132,7 +134,7 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     for field in plain:
         if field not in first:
             yield _parameter(field)
-    if input_of(spec, InputKind.BOUNDARY) or input_of(spec, InputKind.CENTRELINES):
+    if any(item.kind.is_ground for item in spec.inputs):
         crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)
         yield _helped(crs, _CRS_HELP)
     for field in fields:

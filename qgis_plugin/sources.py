@@ -28,8 +28,11 @@ from qgis_plugin.feedback import stop_if_cancelled
 from qgis_plugin.geopackage import OGR
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
 from urban_processing.algorithms.choices import layout_problems
+from urban_processing.blocks.model import Blocks
 from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError
+from urban_processing.intake.block_values import block_columns
+from urban_processing.intake.blocks import build_blocks
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
@@ -37,6 +40,10 @@ from urban_processing.intake.sites import build_site
 from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
+from urban_processing.layout_file.subdivisions import read_subdivision
+from urban_processing.params import Params
+from urban_processing.params.subdivide import SubdivideParams
+from urban_processing.parcelling.reuse import Previous
 from urban_processing.site import Site
 
 if TYPE_CHECKING:
@@ -54,6 +61,8 @@ class Sources:
     ----------
     algorithm, parameters, context, feedback
         As QGIS gives them.
+    params
+        The parameters as the engine takes them.
     """
 
     def __init__(
@@ -62,7 +71,9 @@ class Sources:
         parameters: Mapping[str, Any],
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
+        params: Params,
     ) -> None:
+        self.params = params
         self.algorithm = algorithm
         self.parameters = dict(parameters)
         self.context = context
@@ -82,6 +93,8 @@ class Sources:
             InputKind.BOUNDARY: self._site,
             InputKind.LAYOUT: self._layout,
             InputKind.CENTRELINES: self._streets,
+            InputKind.BLOCK_LAYER: self._blocks,
+            InputKind.SUBDIVISION: self._subdivision,
         }
         inputs: dict[str, Any] = {}
         for item in self.algorithm.spec.inputs:
@@ -127,6 +140,30 @@ class Sources:
             asked=self._asked_crs(),
             land=None if land is None else self._features(land),
         )
+
+    def _blocks(self, item: Input) -> Blocks | None:
+        """Read blocks, and the streets along them."""
+        features = self._features(item, block_columns())
+        if features is None:
+            return None
+        self.name = self.name or features.name
+        streets = input_of(self.algorithm.spec, InputKind.BLOCK_STREETS)
+        params = self.params if isinstance(self.params, SubdivideParams) else None
+        return build_blocks(
+            features,
+            library=QgisCrs(self.context.transformContext()),
+            asked=self._asked_crs(),
+            streets=None if streets is None else self._features(streets, STREET_COLUMNS),
+            params=params,
+        )
+
+    def _subdivision(self, item: Input) -> Previous | None:
+        """Read a subdivision made before, if one was given."""
+        name = parameter_name(item.name)
+        if not is_given(self.parameters, name):
+            return None
+        path = self.algorithm.parameterAsFile(self.parameters, name, self.context)
+        return read_subdivision(path, library=OGR)
 
     def _asked_crs(self) -> QgsCoordinateReferenceSystem | None:
         """Return the CRS to work in, if one was given."""

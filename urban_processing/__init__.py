@@ -16,13 +16,14 @@ from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from urban_processing import errors
-    from urban_processing.api import cogenerate, find_blocks, optimize
+    from urban_processing.api import cogenerate, find_blocks, optimize, subdivide
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.params.blocks import BlocksParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
     from urban_processing.params.optimize import OptimizeParams
     from urban_processing.params.rules import Preset
+    from urban_processing.params.subdivide import Strategy, SubdivideParams
 
 _HOME = {
     "BlocksParams": "urban_processing.params.blocks",
@@ -31,11 +32,14 @@ _HOME = {
     "GeoLayout": "urban_processing.io.frames",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
+    "Strategy": "urban_processing.params.subdivide",
     "StreetPattern": "urban_processing.params.cogenerate",
+    "SubdivideParams": "urban_processing.params.subdivide",
     "cogenerate": "urban_processing.api",
     "find_blocks": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
+    "subdivide": "urban_processing.api",
 }
 
 __all__ = [
@@ -45,13 +49,16 @@ __all__ = [
     "GeoLayout",
     "OptimizeParams",
     "Preset",
+    "Strategy",
     "StreetPattern",
+    "SubdivideParams",
     "__version__",
     "cogenerate",
     "errors",
     "find_blocks",
     "optimize",
     "read_layout",
+    "subdivide",
 ]
 
 

@@ -8,9 +8,10 @@ from urban_processing.algorithms.blocks import BLOCKS
 from urban_processing.algorithms.cogenerate import COGENERATE
 from urban_processing.algorithms.optimize import OPTIMIZE
 from urban_processing.algorithms.spec import AlgorithmSpec
+from urban_processing.algorithms.subdivide import SUBDIVIDE
 from urban_processing.errors import ParameterError
 
-_SPECS = (COGENERATE, OPTIMIZE, BLOCKS)
+_SPECS = (COGENERATE, OPTIMIZE, BLOCKS, SUBDIVIDE)
 
 
 def specs() -> tuple[AlgorithmSpec, ...]:

@@ -57,6 +57,11 @@ class InputKind(enum.StrEnum):
         """Name of the argument of `read_boundary` that takes such an input; empty for others."""
         return _OF_SITE.get(self, "")
 
+    @property
+    def is_ground(self) -> bool:
+        """Whether such an input is what the work is done on: it has a frame, and issues."""
+        return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
+
 
 _OF_SITE = {
     InputKind.CORNER_POINTS: "corners",

@@ -81,6 +81,16 @@ class StreetsOnLand:
     streets: StreetLines
     land: tuple[shapely.Polygon, ...] | None = None
 
+    @property
+    def frame(self) -> Frame:
+        """Where the local coordinates lie on the map."""
+        return self.streets.frame
+
+    @property
+    def issues(self) -> tuple[Issue, ...]:
+        """What reading the streets has to say."""
+        return self.streets.issues
+
 
 def street_lines(
     lines: npt.ArrayLike,

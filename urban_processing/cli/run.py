@@ -9,7 +9,6 @@ from typing import Any
 from urban_processing.algorithms.spec import (
     AlgorithmSpec,
     Estimate,
-    InputKind,
     OutputKind,
 )
 from urban_processing.algorithms.words import duration_in_words, estimate_in_words
@@ -78,13 +77,10 @@ def _run(
 
 
 def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) -> None:
-    """Repeat on stderr what was repaired or changed in reading a boundary."""
+    """Repeat on stderr what was repaired or changed in reading the inputs."""
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY:
+        if item.kind.is_ground:
             for issue in call.inputs[item.name].issues:
-                terminal.note(issue.message)
-        elif item.kind is InputKind.CENTRELINES:
-            for issue in call.inputs[item.name].streets.issues:
                 terminal.note(issue.message)
 
 

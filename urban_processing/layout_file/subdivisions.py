@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ from urban_processing.parcelling.reuse import Parcels, Previous
 from urban_processing.parcelling.rules import resolve_rules, rule_values
 from urban_processing.schema import PROVENANCE
 from urban_processing.site import Frame
+from urban_processing.tables import LayerSet
 
 _PARCELS = ("parcel_id", "block_id", "level", "lineage", "land_use")
 
@@ -66,21 +68,54 @@ def _frame(path: Path) -> Frame:
     return Frame(state["crs"], (float(x), float(y)))
 
 
-def _read(path: Path, frame: Frame, library: LayerLibrary) -> Previous:
-    def local(geometry: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
-        return np.asarray(shapely.transform(geometry, lambda xy: xy - np.asarray(frame.origin)))
+def previous_of(made: LayerSet) -> Previous:
+    """Return a subdivision as one to go on from, as if it had been written and read again.
 
+    Raises
+    ------
+    BoundaryError
+        If these layers are no subdivision.
+    """
+    if made.kind != SUBDIVISION_KIND:
+        raise BoundaryError(f"Layers of {made.kind} are no subdivision: give what subdivide made.")
+    blocks, parcels = made.table(SUBDIVIDED_BLOCKS.name), made.table(SUBDIVIDED_PARCELS.name)
+    return _previous(
+        made.frame,
+        (blocks.shapes, blocks.columns),
+        (parcels.shapes, parcels.columns),
+        made.history[-1].parameters,
+    )
+
+
+def _read(path: Path, frame: Frame, library: LayerLibrary) -> Previous:
     names = [c.name for c in SUBDIVIDED_BLOCKS.columns if c.name not in ("part", "area_m2")]
-    outlines, block = library.read_layer(path, SUBDIVIDED_BLOCKS.name, names)
-    shapes, parcel = library.read_layer(path, SUBDIVIDED_PARCELS.name, _PARCELS)
     _, provenance = library.read_layer(path, PROVENANCE.name, ("parameters",))
+    return _previous(
+        frame,
+        library.read_layer(path, SUBDIVIDED_BLOCKS.name, names),
+        library.read_layer(path, SUBDIVIDED_PARCELS.name, _PARCELS),
+        json.loads(provenance["parameters"][-1]),
+    )
+
+
+_Rows: TypeAlias = "tuple[npt.NDArray[np.object_], Mapping[str, npt.NDArray[Any]]]"
+"""Geometries in map coordinates, and columns."""
+
+
+def _previous(
+    frame: Frame, blocks: _Rows, parcels: _Rows, parameters: Mapping[str, Any]
+) -> Previous:
+    (outlines, block), (shapes, parcel) = blocks, parcels
     broken = ~shapely.is_valid(shapes)
     if broken.any():
         named = ", ".join(str(v) for v in parcel["parcel_id"][broken][:5].tolist())
-        raise BoundaryError(f"Parcels of {path} are no valid polygons any more: {named}.")
+        raise BoundaryError(f"Parcels of the subdivision are no valid polygons any more: {named}.")
+
+    def local(geometry: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+        return np.asarray(shapely.transform(geometry, lambda xy: xy - np.asarray(frame.origin)))
+
     order = np.argsort(block["block_id"], kind="stable")
-    row = np.searchsorted(block["block_id"][order], parcel["block_id"])
-    own = _own_values(block, json.loads(provenance["parameters"][-1]))
+    own = _own_values(block, parameters)
     return Previous(
         blocks=plain_blocks(
             local(outlines)[order],
@@ -91,7 +126,7 @@ def _read(path: Path, frame: Frame, library: LayerLibrary) -> Previous:
         block_key=block["block_key"][order],
         parcels=Parcels(
             polygons=local(shapes),
-            block=row,
+            block=np.searchsorted(block["block_id"][order], parcel["block_id"]),
             lineage=np.array([int(text, 16) for text in parcel["lineage"]], dtype=np.uint64),
             level=np.asarray(parcel["level"], dtype=np.int64),
             patio=parcel["land_use"] == PATIO_USE,
@@ -101,7 +136,7 @@ def _read(path: Path, frame: Frame, library: LayerLibrary) -> Previous:
 
 
 def _own_values(
-    block: dict[str, npt.NDArray[Any]], parameters: dict[str, Any]
+    block: Mapping[str, npt.NDArray[Any]], parameters: Mapping[str, Any]
 ) -> dict[str, npt.NDArray[np.object_]]:
     """Values of parameters that were set for single blocks, None where the general one held."""
     n = len(block["block_id"])

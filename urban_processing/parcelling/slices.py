@@ -240,7 +240,7 @@ def _without_spurs(ring: list[int]) -> list[int]:
         if kept[-1] == kept[1]:
             del kept[0]
     while len(kept) > 2 and kept[-2] == kept[0]:
-        kept = kept[:-2] 
+        kept = kept[:-2]
     return kept
 
 
