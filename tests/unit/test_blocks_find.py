@@ -396,3 +396,14 @@ def test_blocks_of_real_streets_tile_what_they_enclose(city: str) -> None:
     assert out.blocks.edge_access.all()
     assert shapely.area(out.blocks.polygons).min() >= 100
     assert rings_of(out.blocks.polygons).offsets[-1] == len(out.blocks.edge_access)
+
+
+def test_streets_that_leave_the_land_are_no_dead_ends() -> None:
+    land = [shapely.box(0, 0, 200, 100)]
+    lines = [line((100, -50), (100, 150)), line((100, 50), (150, 50)), line((0.5, 20), (99.5, 20))]
+    lines += [line((1000, 0), (1300, 0))]
+    kept = found(lines, land=land)
+    assert told(kept) == {"ends_joined": 1.0, "dead_ends": 1.0, "blocks_fall_apart": 1.0}
+    pruned = found(lines, land=land, dead_ends=False)
+    assert "dead_ends_left_out" in told(pruned)
+    assert sorted(areas(pruned)) == [pytest.approx(a, abs=8) for a in (1425, 7125, 9500)]

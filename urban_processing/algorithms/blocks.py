@@ -67,7 +67,7 @@ BLOCKS = AlgorithmSpec(
         "C. A. Vanegas, T. Kelly, B. Weber, J. Halatsch, D. G. Aliaga and P. Müller (2012). "
         "Procedural generation of parcels in urban modeling. Computer Graphics Forum 31(2). "
         "Section 3.",
-        "R. C. Thomson and D. E. Richardson (1999). The 'good continuation' principle of "
+        "R. C. Thomson and D. E. Richardson (1999). The “good continuation” principle of "
         "perceptual organization applied to the generalization of road networks. Proceedings of "
         "the 19th International Cartographic Conference.",
     ),

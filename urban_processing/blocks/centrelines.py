@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,7 +68,11 @@ class Centrelines:
 
 
 def clean_centrelines(
-    streets: StreetLines, *, snap: float, dead_ends: bool
+    streets: StreetLines,
+    *,
+    snap: float,
+    dead_ends: bool,
+    land: Sequence[shapely.Polygon] | None = None,
 ) -> tuple[Centrelines, list[Issue]]:
     """Node lines, and mend what is not as a network of streets is.
 
@@ -82,6 +87,8 @@ def clean_centrelines(
         Metres.
     dead_ends
         Whether streets stay that lead to nothing.
+    land
+        Land that is looked at: ends on its rim and outside are no dead ends.
     """
     issues: list[Issue] = []
     rows = np.flatnonzero(_worth_keeping(streets.lines, snap, issues))
@@ -92,7 +99,12 @@ def clean_centrelines(
     _tell_doubled(lines, work, snap, issues)
     work = _without_stubs(work, streets.width, snap, issues)
     work = _joined(work, streets.width, snap, issues)
-    return _dead_ends(work, issues, kept=dead_ends), issues
+    return _dead_ends(work, issues, kept=dead_ends, within=_interior(land, snap)), issues
+
+
+def _interior(land: Sequence[shapely.Polygon] | None, snap: float) -> shapely.Geometry | None:
+    """Land without what lies within a tolerance of its rim."""
+    return None if land is None else shapely.union_all(shapely.buffer(list(land), -snap))
 
 
 def _worth_keeping(lines: npt.NDArray[np.object_], snap: float, issues: list[Issue]) -> BoolArray:
@@ -289,11 +301,17 @@ def _foot(segment: FloatArray, place: FloatArray, snap: float) -> FloatArray:
     return snap_to_grid(segment[0] + share * way)
 
 
-def _dead_ends(work: Centrelines, issues: list[Issue], *, kept: bool) -> Centrelines:
+def _dead_ends(
+    work: Centrelines, issues: list[Issue], *, kept: bool, within: shapely.Geometry | None
+) -> Centrelines:
     """Count the dead ends; take away what leads to nothing else if they are not kept."""
     xy, ends = work.node_xy, work.ends
+    inside = np.ones(len(xy), dtype=bool)
+    if within is not None:
+        shapely.prepare(within)
+        inside = shapely.contains_xy(within, *xy.T)
     degree = np.bincount(ends.ravel(), minlength=len(xy))
-    dead = np.flatnonzero(degree == 1)
+    dead = np.flatnonzero((degree == 1) & inside)
     if not len(dead):
         return work
     message = f"{len(dead)} street(s) are dead ends" + (
@@ -306,7 +324,7 @@ def _dead_ends(work: Centrelines, issues: list[Issue], *, kept: bool) -> Centrel
     alive = np.ones(len(ends), dtype=bool)
     while True:
         degree = np.bincount(ends[alive].ravel(), minlength=len(xy))
-        loose = alive & (degree[ends] == 1).any(axis=1)
+        loose = alive & ((degree == 1) & inside)[ends].any(axis=1)
         if not loose.any():
             return work.take(alive)
         alive &= ~loose

@@ -84,7 +84,9 @@ def find_blocks(
     """
     usable, issues = chosen_streets(streets, params)
     snap = params.snap_tolerance
-    work, mended = clean_centrelines(usable, snap=snap, dead_ends=params.dead_ends)
+    if land is not None:
+        usable = _near(usable, land, snap)
+    work, mended = clean_centrelines(usable, snap=snap, dead_ends=params.dead_ends, land=land)
     work, faces = find_faces(work, land)
     if not len(faces.polygons):
         raise BoundaryError(
@@ -133,6 +135,13 @@ def find_blocks(
         right_of_way_class=classes[net.rank],
         right_of_way_part=net.part,
     )
+
+
+def _near(streets: StreetLines, land: Sequence[shapely.Polygon], snap: float) -> StreetLines:
+    """Lines whose right-of-way comes within a tolerance of the land."""
+    ground = shapely.union_all(list(land))
+    shapely.prepare(ground)
+    return streets.take(shapely.dwithin(ground, streets.lines, streets.width / 2 + snap))
 
 
 def _ranks(street_class: StrArray, params: BlocksParams) -> tuple[StrArray, IntArray]:
