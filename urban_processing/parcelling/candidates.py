@@ -54,8 +54,10 @@ class Faces:
         Their rings and their smallest boxes.
     area
         (K,) in m².
-    least, min_width, snap
-        (K,) smallest area, smallest width, and distance within which cuts go through corners.
+    least, largest
+        (K,) smallest area of a piece, and the largest that is not halved again.
+    min_width, snap
+        (K,) smallest width, and distance within which cuts go through corners.
     narrowest
         (K,) width that pieces may have if `min_width` cannot be kept.
     shift
@@ -68,6 +70,7 @@ class Faces:
     boxes: Boxes
     area: FloatArray
     least: FloatArray
+    largest: FloatArray
     min_width: FloatArray
     snap: FloatArray
     narrowest: FloatArray
@@ -85,6 +88,7 @@ class Faces:
             boxes=self.boxes.take(rows),
             area=self.area[rows],
             least=self.least[rows],
+            largest=self.largest[rows],
             min_width=self.min_width[rows],
             snap=self.snap[rows],
             narrowest=self.narrowest[rows],

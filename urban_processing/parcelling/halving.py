@@ -66,8 +66,9 @@ def halve(faces: Faces, xy: FloatArray, contour: Contour) -> list[Halved]:
     Tried in turn: the regular cut through a corner of the contour, where one is near; the
     regular cut; the one that halves the area, if a piece was too small; the regular cut along
     the other axis, through a corner if near; that cut without it; cuts at half of the area along
-    both axes, then at other shares of it. Where none keeps `min_width`, the first that keeps
-    `narrowest` is made.
+    both axes, then at other shares of it. A cut will do if its pieces keep `least` and `min_width`
+    and, where access is needed, have it, and have fronts for all the parcels they will become. If
+    none will, the first is made whose pieces keep `least` and `narrowest` and have access.
     """
     everyone = np.arange(len(faces))
     along = view_along(faces, xy, contour, turned=False)
@@ -232,7 +233,12 @@ def _verdict(
     if len(doubtful):
         invalid = doubtful[~pieces.take(doubtful).are_valid(points)]
         fair[parent[invalid]] = False
-    good = fair & ~_any(front < faces.min_width[parent] - MEASURED_M, parent, k)
+    bad = front < faces.min_width[parent] - MEASURED_M
+    # so many parcels a piece will be at least, and each needs a front
+    n_parcels = np.ceil(area / faces.largest[parent] * (1.0 - AREA_ROUNDING))
+    cramped = sides.total < n_parcels * faces.narrowest[parent] - MEASURED_M
+    bad |= cramped & faces.needs_access[parent]
+    good = fair & ~_any(bad, parent, k)
     return good, fair, _any(too_small, parent, k)
 
 

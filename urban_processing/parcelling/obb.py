@@ -181,6 +181,7 @@ def _faces_at(
         boxes=boxes,
         area=area,
         least=rules.min_area[block],
+        largest=rules.max_area[block],
         min_width=min_width,
         snap=rules.snap[block],
         narrowest=narrowest,
