@@ -104,13 +104,19 @@ def star(rng: np.random.Generator, n: int, *, radius: float = 60.0, inner: float
 def rectilinear(rng: np.random.Generator, n: int, *, cell: float = 15.0):
     """A polygon of square cells, in whole steps, with many sides in line."""
     cells = {(0, 0)}
-    while len(cells) < n:
-        x, y = list(cells)[rng.integers(len(cells))]
+    for _ in range(20 * n):
+        x, y = sorted(cells)[rng.integers(len(cells))]
         dx, dy = [(1, 0), (-1, 0), (0, 1), (0, -1)][rng.integers(4)]
-        cells.add((x + dx, y + dy))
+        x, y = x + dx, y + dy
+        touches = [
+            (x + i, y + j) in cells and (x + i, y) not in cells and (x, y + j) not in cells
+            for i in (-1, 1)
+            for j in (-1, 1)
+        ]
+        if len(cells) < n and not any(touches):  # none that meets another at a corner alone
+            cells.add((x, y))
     parts = [shapely.box(cell * x, cell * y, cell * (x + 1), cell * (y + 1)) for x, y in cells]
-    shape = shapely.normalize(shapely.union_all(parts))
-    return shapely.simplify(shape, 0) if shape.geom_type == "Polygon" else parts[0]
+    return shapely.simplify(shapely.normalize(shapely.union_all(parts)), 0)
 
 
 def with_holes(rng: np.random.Generator, n: int):
