@@ -52,10 +52,12 @@ class Boxes:
 
     def turned(self, rows: BoolArray) -> Boxes:
         """Return the boxes, in `rows` with their axis along the other side."""
-        across = np.column_stack([-self.axis[:, 1], self.axis[:, 0]])
+        across = np.empty_like(self.axis)
+        across[:, 0], across[:, 1] = -self.axis[:, 1], self.axis[:, 0]
+        across[across @ UPWARD < 0.0] *= -1.0
         return Boxes(
             centre=self.centre,
-            axis=np.where(rows[:, None], _upward(across), self.axis),
+            axis=np.where(rows[:, None], across, self.axis),
             length=np.where(rows, self.width, self.length),
             width=np.where(rows, self.length, self.width),
         )
@@ -160,7 +162,3 @@ def _choose(length: FloatArray, width: FloatArray, turn: FloatArray, first: IntA
     equal &= rank <= np.repeat(np.minimum.reduceat(rank, group), size)
     places = np.where(equal, np.arange(len(turn)), len(turn))
     return np.asarray(np.minimum(np.minimum.reduceat(places, group), len(turn) - 1))
-
-
-def _upward(axis: FloatArray) -> FloatArray:
-    return np.where((axis @ UPWARD < 0.0)[:, None], -axis, axis)
