@@ -44,6 +44,10 @@ _LAYERS = {
     InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
 }
 """Inputs that are layers, and their geometry."""
 
@@ -219,7 +223,8 @@ def _sink(sink: SinkName) -> QgsProcessingParameterFeatureSink:
         createByDefault=layer.shown,
     )
     columns = ", ".join(column.name for column in layer.columns)
-    return _helped(definition, f"Layer with the columns {columns}.")
+    more = ", and those carried along" if layer.open else ""
+    return _helped(definition, f"Layer with the columns {columns}{more}.")
 
 
 def _helped(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingFeedback
 
 from qgis_plugin.crs import crs_of
+from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
 from qgis_plugin.products import product
@@ -71,9 +72,10 @@ def run(
     }
     for sink in destinations.sinks:
         whole = products[sink.output.name]
+        made_of, table = whole.layer(sink.layer)
         results[sink.parameter] = write_sink(
-            sink,
-            whole.layers.get(sink.layer),
+            SinkName(sink.output, made_of),
+            table,
             destinations,
             crs=whole.crs,
             group=groups[sink.output.name],
@@ -93,12 +95,13 @@ def _say_what_inputs_say(
     spec: AlgorithmSpec, inputs: Mapping[str, Any], feedback: QgsProcessingFeedback
 ) -> None:
     """Say which CRS is worked in, and what was repaired or changed in reading a boundary."""
+    telling = (InputKind.BOUNDARY, InputKind.PARCELS_BEFORE)
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY and inputs[item.name] is not None:
-            site = inputs[item.name]
-            for issue in site.issues:
+        if item.kind in telling and inputs[item.name] is not None:
+            given = inputs[item.name]
+            for issue in given.issues:
                 feedback.pushInfo(in_qgis(issue.message))
-            crs = crs_of(site.frame.crs)
+            crs = crs_of(given.frame.crs)
             feedback.pushInfo(f"CRS of the results: {crs.userFriendlyIdentifier()}.")
 
 

@@ -21,6 +21,7 @@ from qgis.core import (
     QgsProcessingFeedback,
     QgsWkbTypes,
 )
+from qgis.PyQt.QtCore import QDate, QDateTime, Qt, QTime
 
 from qgis_plugin.crs import QgisCrs
 from qgis_plugin.definitions import CRS, input_of, is_given, parameter_name
@@ -29,17 +30,21 @@ from qgis_plugin.geopackage import OGR
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
 from urban_processing.algorithms.choices import layout_problems
 from urban_processing.errors import BoundaryError
+from urban_processing.intake.editions import EditionLayers, build_editions
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
 from urban_processing.intake.sites import build_site
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
+from urban_processing.persistence.editions import Editions
 from urban_processing.site import Site
 
 if TYPE_CHECKING:
     from qgis_plugin.algorithm import SpecAlgorithm
 
+
+_TIMES = (QDate, QDateTime, QTime)
 
 _SNAP = "snap"
 """The parameter that edited layers are read with."""
@@ -79,6 +84,7 @@ class Sources:
         readers: Mapping[InputKind, Callable[[Input], Any]] = {
             InputKind.BOUNDARY: self._site,
             InputKind.LAYOUT: self._layout,
+            InputKind.PARCELS_BEFORE: self._editions,
         }
         inputs: dict[str, Any] = {}
         for item in self.algorithm.spec.inputs:
@@ -141,7 +147,32 @@ class Sources:
         crs = QgisCrs(self.context.transformContext())
         return build_layout(*found, library=crs, snap=snap or 0.0)
 
-    def _features(self, item: Input) -> Features[QgsCoordinateReferenceSystem] | None:
+    def _editions(self, item: Input) -> Editions | None:
+        """Read two states of a layout."""
+        before, after, *blocks = (
+            None
+            if (layer := input_of(self.algorithm.spec, kind)) is None
+            # the numbers of blocks and all other columns belong to parcels
+            else self._features(layer, every_column=layer.required)
+            for kind in (
+                item.kind,
+                InputKind.PARCELS_AFTER,
+                InputKind.BLOCKS_BEFORE,
+                InputKind.BLOCKS_AFTER,
+            )
+        )
+        if before is None or after is None:
+            return None
+        self.name = self.name or after.name
+        return build_editions(
+            EditionLayers(before, blocks[0]),
+            EditionLayers(after, blocks[1]),
+            library=QgisCrs(self.context.transformContext()),
+        )
+
+    def _features(
+        self, item: Input, *, every_column: bool = False
+    ) -> Features[QgsCoordinateReferenceSystem] | None:
         """Read a layer, or the features of it that are selected; None where none is given."""
         name = parameter_name(item.name)
         source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
@@ -152,7 +183,7 @@ class Sources:
                 )
             return None
         known = source.fields().names()
-        columns = [column for column in GIVEN_COLUMNS if column in known]
+        columns = known if every_column else [c for c in GIVEN_COLUMNS if c in known]
         rows = self._rows(source, name, columns)
         return Features(
             _objects([geometry for geometry, _ in rows]),
@@ -212,7 +243,9 @@ def _objects(values: Sequence[Any]) -> npt.NDArray[np.object_]:
 
 def _plain(value: Any) -> Any:
     """Return an attribute's value, None where QGIS has NULL."""
-    return None if value == NULL else value
+    if value == NULL:
+        return None
+    return value.toString(Qt.DateFormat.ISODate) if isinstance(value, _TIMES) else value
 
 
 def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:

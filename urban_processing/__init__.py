@@ -16,12 +16,13 @@ from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from urban_processing import errors
-    from urban_processing.api import cogenerate, optimize
+    from urban_processing.api import cogenerate, optimize, transfer
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayout
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
     from urban_processing.params.optimize import OptimizeParams
     from urban_processing.params.rules import Preset
+    from urban_processing.params.transfer import TransferParams
 
 _HOME = {
     "CogenerateParams": "urban_processing.params.cogenerate",
@@ -29,9 +30,11 @@ _HOME = {
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
     "StreetPattern": "urban_processing.params.cogenerate",
+    "TransferParams": "urban_processing.params.transfer",
     "cogenerate": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
+    "transfer": "urban_processing.api",
 }
 
 __all__ = [
@@ -40,11 +43,13 @@ __all__ = [
     "OptimizeParams",
     "Preset",
     "StreetPattern",
+    "TransferParams",
     "__version__",
     "cogenerate",
     "errors",
     "optimize",
     "read_layout",
+    "transfer",
 ]
 
 

@@ -10,15 +10,18 @@ import numpy.typing as npt
 
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
 from urban_processing.io.boundaries import read_boundary
+from urban_processing.io.editions import read_editions
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_layout
-from urban_processing.io.frames import GeoLayout
+from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.layouts import read_layers
 from urban_processing.layout import Layout
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.params.transfer import TransferParams
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
+from urban_processing.pipelines import transfer as persistence
 from urban_processing.pipelines.ground import given_layers
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
@@ -158,6 +161,59 @@ def optimize(
     params = OptimizeParams.from_values(parameters)
     given = _layout(layout, parcels, streets, params)
     return GeoLayout(optimization.optimize(given, params, progress))
+
+
+def transfer(
+    before: Source,
+    after: Source,
+    *,
+    blocks_before: Source | None = None,
+    blocks_after: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Give the parcels after an edit the numbers and columns of the same parcels before it.
+
+    Positions relative to the corners of blocks say which parcel is which (Vanegas 2012,
+    section 5). Numbers stay unique; new ones are above all old ones.
+
+    Parameters
+    ----------
+    before, after
+        Parcels: files, GeoDataFrames or geometries; of a layout file its parcels.
+    blocks_before, blocks_after
+        Polygons of blocks, or lines around them, likewise.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `TransferParams`.
+
+    Returns
+    -------
+    GeoLayers
+        The layers ``parcels`` and ``changes``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> before = [shapely.box(x, 0, x + 20, 30) for x in (0, 20, 40)]
+    >>> after = [shapely.box(x, 0, x + 22, 30) for x in (44, 0, 22)]
+    >>> made = transfer(before, after)
+    >>> made.parcels.parcel_id.tolist(), made.parcels.change.tolist()
+    ([1, 2, 3], ['moved', 'moved', 'moved'])
+    """
+    params = TransferParams.from_values(parameters)
+    editions = read_editions(before, after, blocks_before, blocks_after)
+    return GeoLayers(persistence.transfer(editions, params, progress))
 
 
 def _layout(

@@ -7,9 +7,10 @@ import difflib
 from urban_processing.algorithms.cogenerate import COGENERATE
 from urban_processing.algorithms.optimize import OPTIMIZE
 from urban_processing.algorithms.spec import AlgorithmSpec
+from urban_processing.algorithms.transfer import TRANSFER_SPEC
 from urban_processing.errors import ParameterError
 
-_SPECS = (COGENERATE, OPTIMIZE)
+_SPECS = (COGENERATE, OPTIMIZE, TRANSFER_SPEC)
 
 
 def specs() -> tuple[AlgorithmSpec, ...]:

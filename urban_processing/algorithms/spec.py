@@ -41,6 +41,15 @@ class InputKind(enum.StrEnum):
     over in its place."""
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
+    PARCELS_BEFORE = "parcels before an edit"
+    """Polygons of parcels with all their columns; handed over with the three that follow, as
+    `Editions`."""
+    PARCELS_AFTER = "parcels after an edit"
+    """Polygons of parcels with all their columns."""
+    BLOCKS_BEFORE = "blocks before an edit"
+    """Polygons of blocks, or lines around them."""
+    BLOCKS_AFTER = "blocks after an edit"
+    """Polygons of blocks, or lines around them."""
 
     @property
     def of_site(self) -> str:

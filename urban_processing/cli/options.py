@@ -17,6 +17,14 @@ INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
 
 Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
+_LAYER_OPTIONS = (
+    InputKind.PARCEL_LAYER,
+    InputKind.STREET_LAYER,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
+)
+"""Inputs that are options, not arguments."""
+
 _UNITS = {"m": "METRES", "m²": "M²", "°": "DEGREES"}
 
 
@@ -87,7 +95,7 @@ def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
 
 
 def _input_parameters(item: Input) -> list[click.Parameter]:
-    if item.kind.of_site or item.kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
+    if item.kind.of_site or item.kind in _LAYER_OPTIONS:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
     argument = HelpArgument(
         [item.name],
@@ -96,7 +104,7 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
-    if item.kind is InputKind.LAYOUT:
+    if item.kind is not InputKind.BOUNDARY:
         return [argument]
     place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
     crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."

@@ -67,9 +67,9 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
 
 
 def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) -> None:
-    """Repeat on stderr what was repaired or changed in reading a boundary."""
+    """Repeat on stderr what was repaired or changed in reading land or parcels."""
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY:
+        if item.kind in (InputKind.BOUNDARY, InputKind.PARCELS_BEFORE):
             for issue in call.inputs[item.name].issues:
                 terminal.note(issue.message)
 

@@ -43,7 +43,7 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
         ("Streets", streets, STREETS, "line"),
     ):
         try:
-            found.append(read_features(source, layer=_layer_of(source, layer.name), kind=kind))
+            found.append(read_features(source, layer=layer_if_there(source, layer.name), kind=kind))
         except BoundaryError as error:
             problems += [f"{called}: {problem}" for problem in error.problems]
     if problems:
@@ -51,7 +51,7 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
     return build_layout(*found, library=PYPROJ, snap=snap)
 
 
-def _layer_of(source: Source, name: str) -> str | None:
+def layer_if_there(source: Source, name: str) -> str | None:
     """Name of the layer to read: the one that a layout file has for it, where it is there."""
     if not isinstance(source, str | PathLike) or not Path(source).is_file():
         return None
