@@ -164,8 +164,8 @@ def optimize(
 
 
 def transfer(
-    before: Source,
-    after: Source,
+    before: Source | GeoLayout,
+    after: Source | GeoLayout,
     *,
     blocks_before: Source | None = None,
     blocks_after: Source | None = None,
@@ -180,7 +180,8 @@ def transfer(
     Parameters
     ----------
     before, after
-        Parcels: files, GeoDataFrames or geometries; of a layout file its parcels.
+        Parcels: files, GeoDataFrames or geometries; or layouts, also as files: then their
+        streets say what a block is.
     blocks_before, blocks_after
         Polygons of blocks, or lines around them, likewise.
     progress
@@ -212,8 +213,16 @@ def transfer(
     ([1, 2, 3], ['moved', 'moved', 'moved'])
     """
     params = TransferParams.from_values(parameters)
-    editions = read_editions(before, after, blocks_before, blocks_after)
+    old, new = _state(before, blocks_before), _state(after, blocks_after)
+    editions = read_editions(old[0], new[0], old[1], new[1])
     return GeoLayers(persistence.transfer(editions, params, progress))
+
+
+def _state(parcels: Source | GeoLayout, blocks: Source | None) -> tuple[Source, Source | None]:
+    """Return parcels, and blocks or the streets between them where they are known."""
+    if not isinstance(parcels, GeoLayout):
+        return parcels, blocks
+    return parcels.parcels, parcels.streets if blocks is None else blocks
 
 
 def _layout(

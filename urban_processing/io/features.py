@@ -85,11 +85,14 @@ def split_layer_name(source: Source) -> tuple[Source, str | None]:
 
 
 def _columns_of(frame: Any, columns: Sequence[str] | None) -> dict[str, npt.NDArray[Any]]:
-    """Wanted columns of a GeoDataFrame; a GeoSeries has none."""
+    """Wanted columns of a GeoDataFrame, among all those of its index; a GeoSeries has none."""
+    if columns is None and hasattr(frame, "columns"):
+        named = [name for name in frame.index.names if name is not None]
+        frame = frame.reset_index(level=[n for n in named if n not in frame.columns])
+        columns = [name for name in frame.columns if name != frame.geometry.name]
     known = getattr(frame, "columns", ())
-    if columns is None:
-        columns = [name for name in known if name != frame.geometry.name]
-    return {name: np.asarray(frame[name], dtype=object) for name in columns if name in known}
+    wanted = columns or ()
+    return {name: np.asarray(frame[name], dtype=object) for name in wanted if name in known}
 
 
 def _as_geometries(source: Any) -> npt.NDArray[np.object_]:
