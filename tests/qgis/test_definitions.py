@@ -122,6 +122,10 @@ INPUTS = {
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
     InputKind.PARCEL_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
 }
 
 
@@ -148,14 +152,16 @@ def test_what_must_be_given_stands_at_the_top(provider: Any) -> None:
     assert names[:3] == ["LAYOUT", "PARCEL_LAYER", "STREET_LAYER"]
 
 
-def test_results_are_sinks_and_files_and_all_optional(algorithm: Any) -> None:
+def test_results_are_sinks_and_files_and_all_optional(
+    algorithm: Any, spec: AlgorithmSpec
+) -> None:
     made = {d.name(): d for d in algorithm.destinationParameterDefinitions()}
     optional = QgsProcessingParameterDefinition.Flag.FlagOptional
     assert all(bool(d.flags() & optional) for d in made.values())
     by_default = {name for name, d in made.items() if d.createByDefault()}
-    assert by_default == {
-        f"OUTPUT_{name}" for name in ("PARCELS", "STREETS", "JUNCTIONS", "ISSUES")
-    }
+    own = {"transfer": ("PARCELS", "CHANGES", "ISSUES")}
+    shown = own.get(spec.name, ("PARCELS", "STREETS", "JUNCTIONS", "ISSUES"))
+    assert by_default == {f"OUTPUT_{name}" for name in shown}
     files = {n for n, d in made.items() if isinstance(d, QgsProcessingParameterFileDestination)}
     assert files == {"OUTPUT", "PLOT"}
     assert made["OUTPUT"].defaultFileExtension() == "gpkg"
