@@ -44,6 +44,10 @@ _LAYERS = {
     InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.CENTRELINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
@@ -134,7 +138,7 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     for field in plain:
         if field not in first:
             yield _parameter(field)
-    if input_of(spec, InputKind.BOUNDARY):
+    if any(item.kind.is_ground for item in spec.inputs):
         crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)
         yield _helped(crs, _CRS_HELP)
     for field in fields:

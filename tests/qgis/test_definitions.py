@@ -152,9 +152,7 @@ def test_what_must_be_given_stands_at_the_top(provider: Any) -> None:
     assert names[:3] == ["LAYOUT", "PARCEL_LAYER", "STREET_LAYER"]
 
 
-def test_results_are_sinks_and_files_and_all_optional(
-    algorithm: Any, spec: AlgorithmSpec
-) -> None:
+def test_results_are_sinks_and_files_and_all_optional(algorithm: Any, spec: AlgorithmSpec) -> None:
     made = {d.name(): d for d in algorithm.destinationParameterDefinitions()}
     optional = QgsProcessingParameterDefinition.Flag.FlagOptional
     assert all(bool(d.flags() & optional) for d in made.values())

@@ -17,14 +17,6 @@ INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
 
 Completion = Callable[[click.Context, click.Parameter, str], list[str]]
 
-_LAYER_OPTIONS = (
-    InputKind.PARCEL_LAYER,
-    InputKind.STREET_LAYER,
-    InputKind.BLOCKS_BEFORE,
-    InputKind.BLOCKS_AFTER,
-)
-"""Inputs that are options, not arguments."""
-
 _UNITS = {"m": "METRES", "m²": "M²", "°": "DEGREES"}
 
 
@@ -47,6 +39,19 @@ def command_parameters(spec: AlgorithmSpec) -> list[click.Parameter]:
     parameters += _writing_options(spec)
     for panel, fields in spec.panels().items():
         parameters += [parameter_option(field, panel) for field in fields]
+    if spec.parallel:
+        side_by_side = "Number of processes that work side by side; the result is the same."
+        parameters.append(
+            _option(
+                "--processes",
+                metavar="N",
+                type=click.IntRange(min=1),
+                default=1,
+                panel=OTHER,
+                help=side_by_side,
+                note="at least 1; default 1",
+            )
+        )
     quiet = "Say nothing but warnings and errors."
     parameters.append(_option("--quiet", "-q", is_flag=True, panel=OTHER, help=quiet))
     return parameters
@@ -94,8 +99,24 @@ def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
     return _option(*flags, type=click.Path(), metavar=metavar, **kwargs)
 
 
+_BY_OPTION = (
+    InputKind.PARCEL_LAYER,
+    InputKind.STREET_LAYER,
+    InputKind.BLOCK_STREETS,
+    InputKind.SUBDIVISION,
+    InputKind.LAND,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
+)
+"""Inputs that are options; the others are arguments."""
+
+
+_WITHOUT_CHOICE = (InputKind.LAYOUT, InputKind.PARCELS_BEFORE, InputKind.PARCELS_AFTER)
+"""Arguments that say themselves which layer of a file is meant."""
+
+
 def _input_parameters(item: Input) -> list[click.Parameter]:
-    if item.kind.of_site or item.kind in _LAYER_OPTIONS:
+    if item.kind.of_site or item.kind in _BY_OPTION:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
     argument = HelpArgument(
         [item.name],
@@ -104,13 +125,21 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
-    if item.kind is not InputKind.BOUNDARY:
+    if item.kind in _WITHOUT_CHOICE:
         return [argument]
+    if item.kind is not InputKind.BOUNDARY:
+        return [argument, *_choice_of_features()]
     place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
-    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
     return [
         argument,
         _option("--place", metavar="NAME", panel=INPUT, help=place),
+        *_choice_of_features(),
+    ]
+
+
+def _choice_of_features() -> list[click.Parameter]:
+    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
+    return [
         _option("--layer", metavar="NAME", panel=INPUT, help="Layer of a file that has several."),
         _option(
             "--where",

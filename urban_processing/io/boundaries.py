@@ -11,7 +11,7 @@ from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.sites import build_site
-from urban_processing.io.crs import PYPROJ, parse_crs
+from urban_processing.io.crs import PYPROJ, asked_crs
 from urban_processing.io.features import Source, read_features, split_layer_name
 from urban_processing.site import Site
 
@@ -82,7 +82,7 @@ def read_boundary(
     ('EPSG:32630', 9600.0)
     """
     problems: list[str] = []
-    asked = _asked_crs(crs, problems)
+    asked = asked_crs(crs, problems)
     features = _read(source, layer, where, problems)
     given_corners = _read_points(corners, "Corners", problems)
     given = GivenLayers(
@@ -107,16 +107,6 @@ def _read(
 ) -> Features[pyproj.CRS] | None:
     try:
         return read_features(source, layer=layer, where=where)
-    except BoundaryError as error:
-        problems += error.problems
-        return None
-
-
-def _asked_crs(crs: object, problems: list[str]) -> pyproj.CRS | None:
-    if crs is None:
-        return None
-    try:
-        return parse_crs(crs)
     except BoundaryError as error:
         problems += error.problems
         return None

@@ -8,7 +8,7 @@ from urban_processing.errors import BoundaryError
 from urban_processing.intake.editions import EditionLayers, build_editions
 from urban_processing.io.crs import PYPROJ
 from urban_processing.io.features import Source, read_features, split_layer_name
-from urban_processing.io.layouts import layer_if_there
+from urban_processing.io.layouts import layer_in
 from urban_processing.persistence.editions import Editions
 from urban_processing.schema import BLOCK_ID, PARCELS, STREETS
 
@@ -52,9 +52,9 @@ def read_editions(
 
 def _edition(parcels: Source, blocks: Source | None) -> EditionLayers[pyproj.CRS]:
     source, layer = split_layer_name(parcels)
-    read = read_features(source, layer=layer or layer_if_there(source, PARCELS.name), columns=None)
+    read = read_features(source, layer=layer or layer_in(source, PARCELS.name), columns=None)
     if blocks is None:
-        streets = layer_if_there(source, STREETS.name)
+        streets = layer_in(source, STREETS.name)
         if layer is not None or streets is None or BLOCK_ID.name in read.columns:
             return EditionLayers(read)
         return EditionLayers(read, read_features(source, layer=streets, kind="line"))

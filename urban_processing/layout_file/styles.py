@@ -228,6 +228,17 @@ def _junctions() -> list[_Rule]:
     ]
 
 
+def _block_edges() -> list[_Rule]:
+    def edge(color: str, dash: str) -> list[ET.Element]:
+        options = {"line_color": color, "line_style": dash, "line_width": "0.5"}
+        return [_layer("SimpleLine", {**options, "line_width_unit": _MILLIMETRES})]
+
+    return [
+        _Rule("Street side", '"access"', edge(_CASING, "solid"), "line"),
+        _Rule("No street", "ELSE", edge(_OUTLINE, "dash"), "line"),
+    ]
+
+
 def _issues() -> list[_Rule]:
     alert = _marker("diamond", "255,255,255,255", metres=1, at_least=2.4, outline=_ALERT)
     area = _fill("200,30,40,30", outline=_ALERT, width=0.4)
@@ -267,6 +278,8 @@ _RULES = {
         _Rule("Right-of-way", "", [_fill(_SURFACE, outline=_SURFACE)], "fill")
     ],
     "net_parcels": lambda: [_Rule("Net parcel", "", [_fill(_PAPER)], "fill")],
+    "blocks": lambda: [_Rule("Block", "", [_fill(_PAPER, outline=_DARK, width=0.2)], "fill")],
+    "block_edges": _block_edges,
     "issues": _issues,
 }
 

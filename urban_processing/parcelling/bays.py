@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.strips import Strip
@@ -12,8 +12,7 @@ from urban_processing.parcelling.strips import Strip
 TINY = 1e-6
 
 
-@dataclass(frozen=True)
-class Hit:
+class Hit(NamedTuple):
     """Where a line from the front meets the back.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.boxes import Boxes
 from urban_processing.parcelling.line_cuts import TOUCH
-from urban_processing.parcelling.rings import Rings
+from urban_processing.parcelling.rings import Rings, changes
 from urban_processing.parcelling.sweep import Sweep, sweep_along
 from urban_processing.site import AREA_ROUNDING
 
@@ -186,7 +186,7 @@ def _through_holes(faces: Faces, sweep: Sweep, place: FloatArray) -> FloatArray:
     moved = np.clip(place[face], low + margin, high - margin)
     way = np.round(np.abs(moved - place[face]) / TOUCH)
     order = np.lexsort((moved, way, face))
-    nearest = order[np.flatnonzero(np.diff(face[order], prepend=-1))]
+    nearest = order[np.flatnonzero(changes(face[order]))]
     out = place.copy()
     out[face[nearest]] = moved[nearest]
     return out

@@ -10,7 +10,7 @@ from urban_processing.access_rule import MEASURED_M, reached_frontage
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.candidates import Contour, Faces, View, view_along
 from urban_processing.parcelling.line_cuts import TOUCH, Cut, Lines, cut
-from urban_processing.parcelling.rings import Rings, ranges
+from urban_processing.parcelling.rings import Rings, changes, ranges
 from urban_processing.site import AREA_ROUNDING
 
 OTHER_SHARES = (1 / 3, 2 / 3)
@@ -111,7 +111,7 @@ def street_sides(rings: Rings, xy: FloatArray, axis: FloatArray, contour: Contou
     side = 4 * face + 2 * is_along + (part > 0)
     sides = np.bincount(side, weights=np.abs(part), minlength=4 * n).reshape(n, 4)
     length = np.sqrt(along * along + across * across)
-    frontage = np.bincount(face, weights=length, minlength=n)
+    frontage = np.bincount(face, weights=length, minlength=n).astype(np.float64)
     return StreetSides(frontage, sides.max(axis=1), sides.sum(axis=1))
 
 
@@ -152,7 +152,11 @@ def _last_choice(rows: IntArray, along: View, across: View) -> _Choice:
 
 def _left(rows: IntArray, done: list[Halved]) -> IntArray:
     """Return the rows that are not among those done."""
-    return np.setdiff1d(rows, np.concatenate([part.rows for part in done]), assume_unique=True)
+    left = np.zeros(rows[-1] + 1 if len(rows) else 0, dtype=bool)
+    left[rows] = True
+    for part in done:
+        left[part.rows[part.rows < len(left)]] = False
+    return left.nonzero()[0]
 
 
 def _try(
@@ -176,8 +180,8 @@ def _try(
 
 def _first_of_each(row: IntArray, chosen: BoolArray) -> IntArray:
     """Return the first chosen place of each row; rows are in order."""
-    places = np.flatnonzero(chosen)
-    return places[np.diff(row[places], prepend=-1) > 0]
+    places = chosen.nonzero()[0]
+    return places[changes(row[places])]
 
 
 def _at_a_pinch(faces: Faces, xy: FloatArray, rows: IntArray, spares: list[_Choice]) -> Halved:

@@ -14,7 +14,7 @@ import shapely
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.ground import FINE_GRID
-from urban_processing.parcelling.rings import Rings, ranges, starts
+from urban_processing.parcelling.rings import Rings, changes, ranges, starts
 
 TOUCH = 2.0**-20
 """A line within this distance of a vertex, in metres, goes through it."""
@@ -147,7 +147,7 @@ def _crossings(
 
     ring = np.searchsorted(rings.offsets, i, side="right") - 1
     after = np.arange(1, len(i) + 1)
-    first = np.flatnonzero(np.diff(ring, prepend=-1))
+    first = changes(ring).nonzero()[0]
     after[np.append(first[1:], len(i))[: len(first)] - 1] = first
     return _Crossings(i, place, partner, after, vertex), added
 
@@ -211,7 +211,7 @@ def _without_repeats(
     kept = vertex != vertex[after]
     if kept.all():
         return vertex, segment, offsets
-    return vertex[kept], segment[kept], np.append(0, np.cumsum(kept))[offsets]
+    return vertex[kept], segment[kept], starts(kept)[offsets]
 
 
 def _some_rings(rings: Rings, chosen: IntArray) -> Rings:

@@ -222,7 +222,7 @@ def _cut_back(sheet: Sheet, strip: Strip, start: int, stop: int) -> None:
 
 def _unite(sheet: Sheet, strips: list[Strip], needs: Needs, *, shallow: bool) -> list[Strip]:
     """Unite strips that cannot stand alone with others, the weakest first."""
-    strips = list(strips)
+    strips = [strip for strip in strips if len(strip.ring) > 2]
     barred: set[int] = set()
     while len(strips) > 1:
         weak = [

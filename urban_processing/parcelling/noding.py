@@ -34,18 +34,29 @@ class Segments:
         return np.asarray(at[:, 0] * direction[:, 0] + at[:, 1] * direction[:, 1])
 
 
-def node_rings(rings: Rings, xy: FloatArray, segments: Segments) -> Rings:
+def node_rings(
+    rings: Rings, xy: FloatArray, segments: Segments, *, n_fixed: int
+) -> tuple[Rings, IntArray]:
     """Return the rings with all vertices on them; those of a place become one.
 
     Cuts of the faces on both sides of a segment may meet it at the same place but for rounding:
-    vertices there that are no farther apart than `TOUCH` become that with the lowest number.
+    vertices there that are no farther apart than `TOUCH` become that with the lowest number. The
+    first `n_fixed` vertices stay what they are.
+
+    Returns
+    -------
+    rings
+        The noded rings.
+    source
+        Edge of the rings given that each edge is, or is a part of.
     """
-    base = starts(segments.length + 1.0)
+    source = np.arange(len(rings.vertex))
+    base = np.append(0.0, np.cumsum(segments.length + 1.0))
     key = base[rings.segment] + segments.places(rings.segment, xy[rings.vertex])
     order = np.argsort(key, kind="stable")
-    same = _near_vertices(rings.vertex[order], key[order], len(xy))
+    same = _near_vertices(rings.vertex[order], key[order], len(xy), n_fixed)
     if same is not None:
-        rings = _renamed(rings, same)
+        rings, source = _renamed(rings, same)
         key = base[rings.segment] + segments.places(rings.segment, xy[rings.vertex])
         order = np.argsort(key, kind="stable")
     vertex, key_there = rings.vertex[order], key[order]
@@ -57,12 +68,16 @@ def node_rings(rings: Rings, xy: FloatArray, segments: Segments) -> Rings:
     low, high = np.minimum(key, end), np.maximum(key, end)
     first = np.searchsorted(key_there, low + TOUCH, side="right")
     count = np.maximum(np.searchsorted(key_there, high - TOUCH, side="left") - first, 0)
-    return _with_vertices(rings, (vertex, first, count), backward=end < key)
+    noded, edge = _with_vertices(rings, (vertex, first, count), backward=end < key)
+    return noded, source[edge]
 
 
-def _near_vertices(vertex: IntArray, key: FloatArray, n_vertices: int) -> IntArray | None:
+def _near_vertices(
+    vertex: IntArray, key: FloatArray, n_vertices: int, n_fixed: int
+) -> IntArray | None:
     """(V,) vertex that each one becomes, None where all stay, from vertices along segments."""
     near = (np.diff(key) <= TOUCH) & (np.diff(vertex) != 0)
+    near &= (vertex[1:] >= n_fixed) | (vertex[:-1] >= n_fixed)
     if not near.any():
         return None
     a, b = vertex[:-1][near], vertex[1:][near]
@@ -76,25 +91,26 @@ def _near_vertices(vertex: IntArray, key: FloatArray, n_vertices: int) -> IntArr
             return same
 
 
-def _renamed(rings: Rings, same: IntArray) -> Rings:
+def _renamed(rings: Rings, same: IntArray) -> tuple[Rings, IntArray]:
     """Return the rings with other vertices, without edges that thereby have no length."""
     vertex = same[rings.vertex]
     kept = vertex != vertex[rings.following]
-    offsets = np.append(0, np.cumsum(kept))[rings.offsets]
-    return Rings(vertex[kept], rings.segment[kept], offsets, rings.face)
+    offsets = starts(kept)[rings.offsets]
+    return Rings(vertex[kept], rings.segment[kept], offsets, rings.face), kept.nonzero()[0]
 
 
 def _with_vertices(
     rings: Rings, found: tuple[IntArray, IntArray, IntArray], *, backward: BoolArray
-) -> Rings:
-    """Insert runs of vertices after nodes; `found` is all of them, where runs begin and lengths."""
+) -> tuple[Rings, IntArray]:
+    """Insert runs of vertices after nodes, and say which edge each edge is of.
+
+    `found`: all vertices, where the run of each node begins among them, and its length.
+    """
     vertex, first, count = found
-    if not count.any():
-        return rings
     node = np.repeat(np.arange(len(count)), count + 1)
     step = ranges(np.zeros(len(count), dtype=np.int64), count + 1)
     inserted = np.flatnonzero(step > 0)
     of, nth = node[inserted], step[inserted] - 1
     new = rings.vertex[node]
     new[inserted] = vertex[first[of] + np.where(backward[of], count[of] - 1 - nth, nth)]
-    return Rings(new, rings.segment[node], starts(count + 1)[rings.offsets], rings.face)
+    return Rings(new, rings.segment[node], starts(count + 1)[rings.offsets], rings.face), node

@@ -21,6 +21,10 @@ from urban_processing.site import AREA_ROUNDING
 STRAIGHT = 1e-3
 """Sine of the angle below which the contour does not bend at a vertex: no cut snaps to it."""
 
+AT_A_PINCH = 0.5
+"""Share of the smallest width that pieces of a face above the largest area may be down to, where
+none keeps it: a front somewhat narrow is less of an evil than a parcel that is far too large."""
+
 _DRAWS = 2
 
 
@@ -159,9 +163,8 @@ def _faces_at(
     sides = street_sides(rings, plane.xy, boxes.axis, contour)
     draws = uniform(seed, level.lineage[rows], _DRAWS)
     min_width = rules.min_width[block]
-    excess = area / rules.max_area[block]
-    too_large = excess > 1.0 + AREA_ROUNDING
-    narrowest = np.where(too_large, min_width / np.maximum(excess, 1.0), min_width)
+    too_large = area > rules.max_area[block] * (1.0 + AREA_ROUNDING)
+    narrowest = np.where(too_large, AT_A_PINCH * min_width, min_width)
     narrowest[rings.n_rings > 1] = 0.0
     needs_access = sides.frontage >= reached_frontage(area) - MEASURED_M
     needs_access &= draws[:, 1] < rules.street_access[block]
@@ -231,8 +234,10 @@ def _as_pieces(
             [np.full(np.count_nonzero(leaf), n) for n, leaf in enumerate(leaves)],
         )
     )
-    noded = _from_lowest(node_rings(rings, plane.xy, plane.segments), plane.xy)
-    xy, vertex = _used_vertices(plane.xy, noded.vertex, len(ground.rings.xy))
+    n_ground = len(ground.rings.xy)
+    noded, _ = node_rings(rings, plane.xy, plane.segments, n_fixed=n_ground)
+    noded = _from_lowest(noded, plane.xy)
+    xy, vertex = _used_vertices(plane.xy, noded.vertex, n_ground)
     return Pieces(
         xy=xy,
         vertex=vertex,

@@ -10,6 +10,7 @@ from itertools import pairwise
 from urban_processing.parcelling.lineage import child
 from urban_processing.parcelling.sheet import Sheet
 
+
 @dataclass(frozen=True)
 class Place:
     """A point of a ring: on which edge, and at which share of it."""

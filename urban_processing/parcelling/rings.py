@@ -42,7 +42,7 @@ class Rings:
     @cached_property
     def size(self) -> IntArray:
         """(R,) number of vertices of each ring."""
-        return np.diff(self.offsets)
+        return self.offsets[1:] - self.offsets[:-1]
 
     @cached_property
     def following(self) -> IntArray:
@@ -54,22 +54,25 @@ class Rings:
     @cached_property
     def edge_face(self) -> IntArray:
         """(N,) face of each edge."""
-        return np.repeat(self.face, self.size)
+        return self.face.repeat(self.size)
 
     @cached_property
     def is_shell(self) -> BoolArray:
         """(R,) rings that are shells."""
-        return np.asarray(np.diff(self.face, prepend=-1) != 0)
+        return changes(self.face)
 
     @cached_property
     def n_rings(self) -> IntArray:
         """(F,) number of rings of each face."""
-        return np.diff(self.face_rings)
+        return self.face_rings[1:] - self.face_rings[:-1]
 
     @cached_property
     def face_rings(self) -> IntArray:
         """(F + 1,) where the rings of each face begin."""
-        return np.append(np.flatnonzero(self.is_shell), len(self.face))
+        first = np.empty(self.n_faces + 1, dtype=np.int64)
+        first[:-1] = self.is_shell.nonzero()[0]
+        first[-1] = len(self.face)
+        return first
 
     @cached_property
     def face_nodes(self) -> IntArray:
@@ -78,28 +81,29 @@ class Rings:
 
     def take(self, faces: IntArray) -> Rings:
         """Return the rings of some faces in a new order; face k is ``faces[k]``."""
-        n_rings = self.n_rings[faces]
-        rings = ranges(self.face_rings[faces], n_rings)
+        number = np.arange(len(faces))
+        if self.n_faces == len(self.face):
+            rings, face = faces, number
+        else:
+            n_rings = self.n_rings[faces]
+            rings, face = ranges(self.face_rings[faces], n_rings), number.repeat(n_rings)
         size = self.size[rings]
         nodes = ranges(self.offsets[rings], size)
-        return Rings(
-            vertex=self.vertex[nodes],
-            segment=self.segment[nodes],
-            offsets=starts(size),
-            face=np.repeat(np.arange(len(faces)), n_rings),
-        )
+        return Rings(self.vertex[nodes], self.segment[nodes], starts(size), face)
 
     def signed_areas(self, xy: FloatArray) -> FloatArray:
         """(R,) areas of the rings in m², those of holes below zero."""
-        at = xy[self.vertex]
-        at -= np.repeat(at[self.offsets[:-1]], self.size, axis=0)
-        after = at[self.following]
-        double = at[:, 0] * after[:, 1] - at[:, 1] * after[:, 0]
-        return np.asarray(0.5 * np.add.reduceat(double, self.offsets[:-1]))
+        begin = self.offsets[:-1]
+        x, y = xy[:, 0][self.vertex], xy[:, 1][self.vertex]
+        x -= x[begin].repeat(self.size)
+        y -= y[begin].repeat(self.size)
+        double = x * y[self.following] - y * x[self.following]
+        return np.asarray(0.5 * np.add.reduceat(double, begin))
 
     def areas(self, xy: FloatArray) -> FloatArray:
         """(F,) areas of the faces in m²."""
-        return np.asarray(np.add.reduceat(self.signed_areas(xy), self.face_rings[:-1]))
+        area = self.signed_areas(xy)
+        return area if len(area) == self.n_faces else np.add.reduceat(area, self.face_rings[:-1])
 
     def polygons(self, xy: FloatArray) -> npt.NDArray[np.object_]:
         """(F,) the faces as shapely polygons."""
@@ -115,9 +119,9 @@ class Rings:
 
     def are_valid(self, xy: FloatArray) -> BoolArray:
         """(F,) faces that are valid polygons; only those that are not convex are looked into."""
-        edge = xy[self.vertex[self.following]] - xy[self.vertex]
-        after = edge[self.following]
-        left = edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0] > 0
+        x, y = xy[:, 0][self.vertex], xy[:, 1][self.vertex]
+        x, y = x[self.following] - x, y[self.following] - y
+        left = x * y[self.following] - y * x[self.following] > 0
         valid = np.logical_and.reduceat(left, self.face_nodes[:-1]) & (self.n_rings == 1)
         doubtful = np.flatnonzero(~valid)
         if len(doubtful):
@@ -138,11 +142,22 @@ def join_rings(parts: Sequence[Rings]) -> Rings:
 
 def starts(counts: IntArray) -> IntArray:
     """(K + 1,) where runs of given lengths begin, and where the last one ends."""
-    return np.append(0, np.cumsum(counts))
+    out = np.empty(len(counts) + 1, dtype=np.int64)
+    out[0] = 0
+    np.cumsum(counts, out=out[1:])
+    return out
+
+
+def changes(values: IntArray) -> BoolArray:
+    """(K,) where a value is not the one before it; so is the first."""
+    out = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=out[1:])
+    return out
 
 
 def ranges(first: IntArray, counts: IntArray) -> IntArray:
     """Return ``first[k], first[k] + 1, …``, ``counts[k]`` numbers for each k, in one array."""
-    end = np.cumsum(counts)
-    total = int(end[-1]) if len(end) else 0
-    return np.arange(total) + np.repeat(first - (end - counts), counts)
+    end = counts.cumsum()
+    out: IntArray = (first - end + counts).repeat(counts)
+    out += np.arange(len(out))
+    return out

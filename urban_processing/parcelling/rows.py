@@ -13,10 +13,6 @@ from urban_processing.errors import TopologyError
 from urban_processing.hashing import uniform
 from urban_processing.mesh.corners import ring_areas
 from urban_processing.mesh.planar import IntArray
-from urban_processing.parcelling.ground import Ground, Pieces, Rules
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.mending import Needs, beta_strips
-from urban_processing.parcelling.plots import Plots
 from urban_processing.parcelling.divided import (
     Divided,
     Face,
@@ -26,8 +22,13 @@ from urban_processing.parcelling.divided import (
     straightened,
     whole,
 )
+from urban_processing.parcelling.ground import Ground, Pieces, Rules
+from urban_processing.parcelling.lineage import child
+from urban_processing.parcelling.mending import Needs, beta_strips
+from urban_processing.parcelling.plots import Plots
 from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.slices import Bounds, Slicer, rings_of_lots
+from urban_processing.parcelling.slices import Slicer, rings_of_lots
+from urban_processing.parcelling.spacing import Bounds
 from urban_processing.parcelling.streets import logical_streets, sides_of_rings
 from urban_processing.parcelling.strips import Strip, alpha_strips
 from urban_processing.parcelling.tidy import divide_large, tidy

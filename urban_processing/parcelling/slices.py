@@ -5,43 +5,23 @@ from __future__ import annotations
 import bisect
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import accumulate, pairwise
-from statistics import NormalDist
+from typing import NamedTuple
 
 from urban_processing.parcelling.bays import Bay, Hit, bays_of
 from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
 from urban_processing.parcelling.strips import Strip
 
-SPREAD = 1.0 / 3.0
-"""Standard deviation of widths over the mean width where ω is 1. The paper prints σ² = 3ω, in
-m², which has another meaning for each mean width."""
+STEP = 0.5
+"""Distance of the places where the depth of a strip is measured, over the smallest width."""
 
-MARGIN = 1.1
-"""Parcels are meant to be this much above the smallest area, and below the largest, so that a
-line that is moved a little does not break a bound."""
+TRIES = ((1.0, True, 1.01), (1.0, False, 1.01), (0.0, False, 1.05))
+"""Shares of ω, whether lines are moved to vertices, and margins over the smallest area, in the
+order in which they are tried. Areas of a profile are a little off, hence the margins."""
 
-_NORMAL = NormalDist()
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Bounds of the parcels of one block, lengths in metres and areas in m²."""
-
-    min_area: float
-    max_area: float
-    min_width: float
-    max_width: float
-    irregularity: float
-    snap: float
-
-    @property
-    def mean_width(self) -> float:
-        """Width aimed at."""
-        return 0.5 * (self.min_width + self.max_width)
-
-
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """A line from a point of the front, at length ``s`` along it, to a point of the back.
 
     ``place`` and ``share`` say where the point lies on the front: on which of its edges and where
@@ -119,91 +99,54 @@ class Slicer:
         total += px * qy - qx * py + qx * wy - wx * qy + self.back_sum[k]
         return 0.5 * total
 
-    def measure(self) -> tuple[list[float], list[float], list[float]]:
-        """Lengths along the front, area and number of parcels up to each."""
-        step = 0.5 * self.bounds.min_width
+    def profile(self) -> Profile:
+        """Area behind the front up to each length of it."""
+        step = STEP * self.bounds.min_width
+        end = 0.5 * END * self.length
         spots: list[float] = []
         for bay in self.bays:
             count = max(math.ceil(bay.length / step), 1)
             spots += [bay.start + bay.length * k / count for k in range(count)]
-        total = self.s[-1]
-        spots[0] = min(1e-3, 1e-3 * total)
-        spots.append(total - spots[0])
+        spots[0] = end
+        spots.append(self.length - end)
         areas = [self.area_before(self.cut(s, self._cast(s))) for s in spots]
-        areas = list(accumulate(areas, max))
-        b = self.bounds
-        numbers = [0.0]
-        for (s, t), (low, high) in zip(pairwise(spots), pairwise(areas), strict=True):
-            numbers.append(numbers[-1] + (t - s) / self._width(t - s, high - low))
-        first, last = max(areas[0], 0.0), max(self.area - areas[-1], 0.0)
-        mean = max(b.min_area, self.area / max(numbers[-1], 1.0)) * MARGIN
-        numbers = [number + first / mean for number in numbers]
-        return (
-            [0.0, *spots, total],
-            [0.0, *areas, self.area],
-            [0.0, *numbers, numbers[-1] + last / mean],
-        )
-
-    def _width(self, length: float, area: float) -> float:
-        """Width of parcels aimed at where so much front has so much area behind it."""
-        b = self.bounds
-        depth = max(area, 1e-9) / length
-        width = min(b.mean_width, b.max_area / MARGIN / depth)
-        return max(width, b.min_width, b.min_area * MARGIN / depth)
+        areas = [min(area, self.area) for area in accumulate(areas, max, initial=0.0)]
+        return Profile([0.0, *spots, self.length], [*areas, self.area], self.bounds)
 
     def _cast(self, s: float) -> Hit:
         bay = self.bay_at(s)
         return bay.cast(s - bay.start)
 
-    def number(self, spots: list[float], areas: list[float], numbers: list[float]) -> int:
-        """Return how many parcels the strip becomes."""
-        b = self.bounds
-        most = least = 0.0
-        for (s, t), (low, high) in zip(pairwise(spots), pairwise(areas), strict=True):
-            most += min((t - s) / b.min_width, (high - low) / b.min_area)
-            least += max((t - s) / b.max_width, (high - low) / b.max_area)
-        count = max(math.floor(numbers[-1] + 0.5), math.ceil(least - 1e-6))
-        return max(min(count, math.floor(most + 1e-6), math.floor(self.area / b.min_area)), 1)
-
     def cuts(self, draws: list[float]) -> list[Cut]:
-        """Return the lines, in the order of the front."""
-        spots, areas, numbers = self.measure()
-        count = self.number(spots, areas, numbers)
-        tries = [(1.0, True), (1.0, False), (0.5, True), (0.0, True), (0.0, False)]
-        if self.bounds.irregularity == 0.0:
-            tries = tries[-2:]
-        while count > 1:
-            for most in (self.bounds.max_area, math.inf):
-                for spread, snap in tries:
-                    shares = self._shares(draws[:count], spread)
-                    ends = [_interpolated(a * numbers[-1], numbers, spots) for a in shares[:-1]]
-                    cuts = self._lines(ends, snap=snap)
-                    if self._within_bounds(cuts, most):
-                        return cuts
-            count -= 1
+        """Return the lines, in the order of the front.
+
+        Parameters
+        ----------
+        draws
+            Numbers in [0, 1), as many as there can be parcels.
+        """
+        profile = self.profile()
+        for count in range(profile.number(), 1, -1):
+            for irregularity, snap, margin in TRIES:
+                shares = shares_of(draws[:count], irregularity * self.bounds.irregularity, self.bounds)
+                hits: dict[float, Hit] = {}
+                ends = profile.ends(
+                    shares, partial(self._moved, hits) if snap else _unmoved, margin=margin
+                )
+                if ends is None:
+                    continue
+                cuts = [self.cut(s, hits.get(s) or self._cast(s)) for s in ends]
+                if self._within_bounds(cuts):
+                    return cuts
         return []
 
-    def _shares(self, draws: list[float], spread: float) -> list[float]:
-        """Share of the whole at which each parcel ends: normally distributed widths."""
-        b = self.bounds
-        deviation = SPREAD * b.irregularity * spread
-        low, high = b.min_width / b.mean_width, b.max_width / b.mean_width
-        widths = [
-            min(max(1.0 + deviation * _NORMAL.inv_cdf(min(max(u, 1e-9), 1 - 1e-9)), low), high)
-            for u in draws
-        ]
-        total = sum(widths)
-        return [at / total for at in accumulate(widths)]
-
-    def _lines(self, ends: list[float], *, snap: bool) -> list[Cut]:
-        cuts = []
-        for s in ends:
-            s, hit = self._snapped(s) if snap else (s, self._cast(s))
-            cuts.append(self.cut(s, hit))
-        return cuts
+    def _moved(self, hits: dict[float, Hit], s: float) -> float:
+        """Move a line to a vertex of the front, or to where another row's line ends."""
+        s, hit = self._snapped(s)
+        hits[s] = hit
+        return s
 
     def _snapped(self, s: float) -> tuple[float, Hit]:
-        """Move a line to a vertex of the front, or to where another row's line ends."""
         snap = self.bounds.snap
         k = bisect.bisect(self.s, s)
         near = min((self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1), default=math.inf,
@@ -228,15 +171,11 @@ class Slicer:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
         return (s, hit) if best is None else best[1:]
 
-    def _within_bounds(self, cuts: list[Cut], max_area: float) -> bool:
-        b = self.bounds
-        s = [0.0, *(cut.s for cut in cuts), self.s[-1]]
+    def _within_bounds(self, cuts: list[Cut]) -> bool:
+        """Whether no parcel is too small and no lines cross."""
         areas = [0.0, *(self.area_before(cut) for cut in cuts), self.area]
-        backs = [cut.hit.at for cut in cuts]
-        return (
-            all(t - s >= 0.98 * b.min_width for s, t in pairwise(s))
-            and all(b.min_area <= high - low <= max_area for low, high in pairwise(areas))
-            and all(later <= before + 1e-9 for before, later in pairwise(backs))
+        return all(high - low >= self.bounds.min_area for low, high in pairwise(areas)) and all(
+            later.hit.at <= before.hit.at + 1e-9 for before, later in pairwise(cuts)
         )
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:
@@ -282,14 +221,28 @@ def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[int]
         for _, vertex in spots[place[lot.begin] : place[lot.end] + 1]:
             if vertex != ring[-1]:
                 ring.append(vertex)
-        if ring[-1] == ring[0]:
-            ring.pop()
-        rings.append(ring)
+        rings.append(_without_spurs(ring))
     return rings
 
 
-def _interpolated(value: float, values: list[float], spots: list[float]) -> float:
-    k = min(max(bisect.bisect_right(values, value) - 1, 0), len(values) - 2)
-    rise = values[k + 1] - values[k]
-    share = (value - values[k]) / rise if rise > 0.0 else 0.0
-    return spots[k] + min(share, 1.0) * (spots[k + 1] - spots[k])
+def _without_spurs(ring: list[int]) -> list[int]:
+    """Leave out arcs that have the same lot on both sides."""
+    kept: list[int] = []
+    for v in ring:
+        if kept and kept[-1] == v:
+            continue
+        if len(kept) > 1 and kept[-2] == v:
+            kept.pop()
+        else:
+            kept.append(v)
+    while len(kept) > 2 and kept[0] == kept[-1]:
+        kept.pop()
+        if kept[-1] == kept[1]:
+            del kept[0]
+    while len(kept) > 2 and kept[-2] == kept[0]:
+        kept = kept[:-2]
+    return kept
+
+
+def _unmoved(s: float) -> float:
+    return s

@@ -40,6 +40,11 @@ class Sweep:
         return Sweep(self.rings.take(faces), self.along[node], self.across[node])
 
     @cached_property
+    def _count(self) -> IntArray:
+        """(K,) number of vertices of each face."""
+        return self.rings.face_nodes[1:] - self.rings.face_nodes[:-1]
+
+    @cached_property
     def _edges(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where edges end, and how they slope against the axis."""
         after = self.rings.following
@@ -52,7 +57,7 @@ class Sweep:
     def areas(self, place: FloatArray) -> FloatArray:
         """(K,) area of each face before the line at `place`."""
         end, _, slope = self._edges
-        at = np.repeat(place, np.diff(self.rings.face_nodes))
+        at = place.repeat(self._count)
         a, b = np.minimum(self.along, at), np.minimum(end, at)
         height = self.across + (0.5 * (a + b) - self.along) * slope
         return np.asarray(-np.add.reduceat((b - a) * height, self.rings.face_nodes[:-1]))
@@ -60,7 +65,7 @@ class Sweep:
     def spans(self, place: FloatArray) -> FloatArray:
         """(K,) length of each line within its face."""
         end, run, slope = self._edges
-        at = np.repeat(place, np.diff(self.rings.face_nodes))
+        at = place.repeat(self._count)
         crosses = (self.along <= at) != (end <= at)
         height = np.where(crosses, self.across + (at - self.along) * slope, 0.0)
         return np.asarray(-np.add.reduceat(np.sign(run) * height, self.rings.face_nodes[:-1]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from urban_processing.parcelling.plots import Place, Plots
-from urban_processing.parcelling.slices import Bounds
+from urban_processing.parcelling.spacing import Bounds
 
 LEAST_FRONT = 0.4
 """Shortest frontage of a parcel, over the smallest width."""
