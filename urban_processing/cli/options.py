@@ -105,8 +105,14 @@ _BY_OPTION = (
     InputKind.BLOCK_STREETS,
     InputKind.SUBDIVISION,
     InputKind.LAND,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
 )
 """Inputs that are options; the others are arguments."""
+
+
+_WITHOUT_CHOICE = (InputKind.LAYOUT, InputKind.PARCELS_BEFORE, InputKind.PARCELS_AFTER)
+"""Arguments that say themselves which layer of a file is meant."""
 
 
 def _input_parameters(item: Input) -> list[click.Parameter]:
@@ -119,7 +125,7 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
-    if item.kind is InputKind.LAYOUT:
+    if item.kind in _WITHOUT_CHOICE:
         return [argument]
     if item.kind is not InputKind.BOUNDARY:
         return [argument, *_choice_of_features()]
