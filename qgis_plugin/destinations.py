@@ -140,7 +140,7 @@ class Destinations:
             name = parameter_name(item.name)
             if not is_given(self.parameters, name):
                 continue
-            if item.kind is InputKind.LAYOUT:
+            if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION):
                 found.add(Place(Path(str(self.parameters[name])).resolve()))
                 continue
             layer = self.algorithm.parameterAsVectorLayer(self.parameters, name, self.context)

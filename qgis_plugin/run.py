@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingFeedback
 
 from qgis_plugin.crs import crs_of
+from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
 from qgis_plugin.products import product
 from qgis_plugin.results import write_sink
 from qgis_plugin.sources import Sources
 from qgis_plugin.styling import ResultGroup
-from urban_processing.algorithms import AlgorithmSpec, InputKind
+from urban_processing.algorithms import AlgorithmSpec
 from urban_processing.algorithms.words import estimate_in_words
 from urban_processing.params import Params
 from urban_processing.progress import MANY_PARCELS, Progress
@@ -44,7 +45,7 @@ def run(
         Ids of layers and paths of files by parameter, as QGIS wants them.
     """
     spec = algorithm.spec
-    sources = Sources(algorithm, destinations.parameters, destinations.context, feedback)
+    sources = Sources(algorithm, destinations.parameters, destinations.context, feedback, params)
     inputs = sources.read()
     _say_what_inputs_say(spec, inputs, feedback)
     if spec.estimate is not None:
@@ -71,9 +72,10 @@ def run(
     }
     for sink in destinations.sinks:
         whole = products[sink.output.name]
+        made_of, table = whole.layer(sink.layer)
         results[sink.parameter] = write_sink(
-            sink,
-            whole.layers.get(sink.layer),
+            SinkName(sink.output, made_of),
+            table,
             destinations,
             crs=whole.crs,
             group=groups[sink.output.name],
@@ -92,13 +94,13 @@ def run(
 def _say_what_inputs_say(
     spec: AlgorithmSpec, inputs: Mapping[str, Any], feedback: QgsProcessingFeedback
 ) -> None:
-    """Say which CRS is worked in, and what was repaired or changed in reading a boundary."""
+    """Say which CRS is worked in, and what was repaired or changed in reading the inputs."""
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY and inputs[item.name] is not None:
-            site = inputs[item.name]
-            for issue in site.issues:
+        read = inputs.get(item.name)
+        if item.kind.is_ground and read is not None:
+            for issue in read.issues:
                 feedback.pushInfo(in_qgis(issue.message))
-            crs = crs_of(site.frame.crs)
+            crs = crs_of(read.frame.crs)
             feedback.pushInfo(f"CRS of the results: {crs.userFriendlyIdentifier()}.")
 
 

@@ -77,6 +77,9 @@ class Layer:
         Readable name.
     shown
         Whether a toolbox that makes single layers makes this one unless told otherwise.
+    open
+        Whether columns that somebody gave may follow: then the layer made is another `Layer` of
+        the same name.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Layer:
     columns: tuple[Column, ...]
     title: str
     shown: bool = False
+    open: bool = False
 
     @property
     def column_names(self) -> tuple[str, ...]:
@@ -269,7 +273,11 @@ RIGHT_OF_WAY = Layer(
     "right_of_way",
     GeometryType.POLYGON,
     (
-        _text("class", "Class", "Class of its streets: rim, fixed, collector, local, cul_de_sac."),
+        _text(
+            "class",
+            "Class",
+            "Class of its streets: rim, fixed, collector, local, cul_de_sac, or one given.",
+        ),
         PART,
         TRUE_AREA,
     ),
@@ -279,6 +287,52 @@ RIGHT_OF_WAY = Layer(
 NET_PARCELS = Layer(
     "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, PART, TRUE_AREA), "Net parcels"
 )
+
+_STREET_ID = _integer(
+    "street_id",
+    "Street",
+    "Number of the street along it: that given, or streets of one name or in one line.",
+    nullable=True,
+)
+
+BLOCKS = Layer(
+    "blocks",
+    GeometryType.POLYGON,
+    (
+        BLOCK_ID,
+        PART,
+        TRUE_AREA,
+        _real("perimeter_m", "Perimeter", "Length of all its edges.", unit="m"),
+        _real("frontage_m", "Frontage", "Length of its edges on streets.", unit="m"),
+        _integer("streets", "Streets", "Number of streets around it."),
+    ),
+    "Blocks",
+    shown=True,
+)
+"""Land between streets, net of rights-of-way."""
+
+BLOCK_EDGES = Layer(
+    "block_edges",
+    GeometryType.LINE,
+    (
+        BLOCK_ID,
+        PART,
+        _STREET_ID,
+        _text("class", "Class", "Class of the street; empty where there is none.", nullable=True),
+        _real(
+            "width_m",
+            "Width",
+            "Width of the right-of-way of the street; empty where there is none.",
+            unit="m",
+            nullable=True,
+        ),
+        _real("length_m", "Length", "Length of the edge.", unit="m"),
+        _boolean("access", "Access", "Whether a street lies along it."),
+    ),
+    "Edges of blocks",
+    shown=True,
+)
+"""Edges of blocks with the street along them; those that follow one another on one are one."""
 
 ISSUES = Layer(
     "issues",

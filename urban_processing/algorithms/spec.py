@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
-from urban_processing.progress import Progress
 from urban_processing.schema import Layer
 
 
@@ -41,11 +40,41 @@ class InputKind(enum.StrEnum):
     over in its place."""
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
+    PARCELS_BEFORE = "parcels before an edit"
+    """Polygons of parcels with all their columns; handed over with the three that follow, as
+    `Editions`."""
+    PARCELS_AFTER = "parcels after an edit"
+    """Polygons of parcels with all their columns."""
+    BLOCKS_BEFORE = "blocks before an edit"
+    """Polygons of blocks, or lines around them."""
+    BLOCKS_AFTER = "blocks after an edit"
+    """Polygons of blocks, or lines around them."""
+
+    CENTRELINES = "centrelines of streets"
+    """Lines of streets that blocks are found between; handed over as `StreetsOnLand`."""
+    LAND = "polygons of land"
+    """Land that these blocks are cut at; a part of the `StreetsOnLand`."""
+    BLOCK_LAYER = "block layer"
+    """Polygons of blocks; handed over as `Blocks`."""
+    BLOCK_STREETS = "lines of streets along blocks"
+    """Streets that belong to a layer of blocks."""
+    SUBDIVISION = "subdivision"
+    """A subdivision made before, as a file; handed over as `Previous`."""
 
     @property
     def of_site(self) -> str:
         """Name of the argument of `read_boundary` that takes such an input; empty for others."""
         return _OF_SITE.get(self, "")
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether such an input is what the work is done on: it has a frame, and issues."""
+        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
+
+    @property
+    def chooses_crs(self) -> bool:
+        """Whether the user may choose the CRS in which such an input is worked on."""
+        return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
 
 
 _OF_SITE = {
@@ -172,6 +201,8 @@ class AlgorithmSpec:
         when it is called, so that a list of algorithms costs nothing.
     estimate
         ``estimate(inputs, params)``, where a run may be long.
+    parallel
+        Whether `run` takes a keyword ``executor`` that runs parts of the work side by side.
     references
         The sources, as a reader would look them up.
     examples
@@ -186,8 +217,9 @@ class AlgorithmSpec:
     params: type[Params]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    run: Callable[[Mapping[str, Any], Any, Progress], Mapping[str, Any]]
+    run: Callable[..., Mapping[str, Any]]
     estimate: Callable[[Mapping[str, Any], Any], Estimate] | None = None
+    parallel: bool = False
     references: tuple[str, ...] = ()
     examples: tuple[str, ...] = ()
 

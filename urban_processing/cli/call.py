@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from urban_processing.algorithms.choices import layout_problems
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output
 from urban_processing.cli import stores
 from urban_processing.errors import BoundaryError, UrbanError
 from urban_processing.params.base import Params, option_name
+from urban_processing.params.subdivide import SubdivideParams
+
+P = TypeVar("P", bound=Params)
 
 
 class BadCallError(UrbanError):
@@ -40,8 +43,7 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
     DependencyError
         If a place cannot be looked up.
     """
-    names = [field.name for field in spec.params.fields()]
-    values = {name: given[name] for name in names if given[name] is not None}
+    values = _values(spec, given)
     layers = [i.name for i in spec.inputs if i.kind.of_site and given[i.name] is not None]
     problems = spec.params.problems_with(values, layers=layers)
     problems += _output_problems(spec, given)
@@ -96,6 +98,27 @@ def _read_layout(
         return None
 
 
+def _read_editions(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read the two states of a layout; None where one was not given or is added to `problems`."""
+    del item
+    by_kind = {i.kind: given[i.name] for i in spec.inputs}
+    missing = [
+        i for i in spec.inputs if i.required and given[i.name] is None and i.kind in _EDITIONS
+    ]
+    problems += [f"Give {option_name(i.name).upper()}, {_lower_first(i.help)}" for i in missing]
+    if missing:
+        return None
+    from urban_processing.io.editions import read_editions
+
+    try:
+        return read_editions(*(by_kind[kind] for kind in _EDITIONS))
+    except UrbanError as error:
+        problems += error.problems
+        return None
+
+
 def _snap(spec: AlgorithmSpec, given: Mapping[str, Any]) -> float | None:
     """Tolerance with which edited layers are read, the default where it is no number.
 
@@ -144,9 +167,94 @@ def _boundary(
     )
 
 
+def _read_centrelines(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read streets and the land they are on; None where that failed."""
+    if given[item.name] is None:
+        problems.append(f"Give {option_name(item.name).upper()}, a file with lines of streets.")
+        return None
+    from urban_processing.io.blocks import read_streets
+
+    land = next((given[i.name] for i in spec.inputs if i.kind is InputKind.LAND), None)
+    try:
+        return read_streets(
+            given[item.name],
+            land=land,
+            layer=given["layer"],
+            where=given["where"],
+            crs=given["crs"],
+        )
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _read_blocks(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read blocks and the streets along them; None where that failed."""
+    if given[item.name] is None:
+        problems.append(f"Give {option_name(item.name).upper()}, a file with polygons of blocks.")
+        return None
+    from urban_processing.io.blocks import read_blocks
+
+    streets = next((given[i.name] for i in spec.inputs if i.kind is InputKind.BLOCK_STREETS), None)
+    try:
+        return read_blocks(
+            given[item.name],
+            streets=streets,
+            layer=given["layer"],
+            where=given["where"],
+            crs=given["crs"],
+            params=_usable(SubdivideParams, _values(spec, given)),
+        )
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _read_subdivision(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read a subdivision made before; None where none is given or that failed."""
+    del spec
+    if given[item.name] is None:
+        return None
+    from urban_processing.io.files import read_subdivision
+
+    try:
+        return read_subdivision(given[item.name])
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _usable(params: type[P], values: Mapping[str, Any]) -> P | None:
+    """The parameters that bounds in layers are checked against; None where they are wrong."""
+    return None if params.problems_with(values) else params.from_values(values)
+
+
+def _values(spec: AlgorithmSpec, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of the parameters that were given."""
+    names = [field.name for field in spec.params.fields()]
+    return {name: given[name] for name in names if given[name] is not None}
+
+
+_EDITIONS = (
+    InputKind.PARCELS_BEFORE,
+    InputKind.PARCELS_AFTER,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
+)
+
 _READERS: Mapping[InputKind, _Reader] = {
     InputKind.BOUNDARY: _read_boundary,
     InputKind.LAYOUT: _read_layout,
+    InputKind.CENTRELINES: _read_centrelines,
+    InputKind.BLOCK_LAYER: _read_blocks,
+    InputKind.SUBDIVISION: _read_subdivision,
+    InputKind.PARCELS_BEFORE: _read_editions,
 }
 """What reads an input of a kind; inputs of other kinds are read together with one of these."""
 

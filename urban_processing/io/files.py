@@ -8,7 +8,8 @@ from pathlib import Path
 from urban_processing.io.frames import GeoLayout
 from urban_processing.io.geopackage import PYOGRIO
 from urban_processing.layout import Layout
-from urban_processing.layout_file import files, writing
+from urban_processing.layout_file import files, subdivisions, writing
+from urban_processing.parcelling.reuse import Previous
 from urban_processing.tables import LayerSet
 
 
@@ -59,6 +60,11 @@ def write_layers(
     return writing.write_layer_set(
         made, path, library=PYOGRIO, overwrite=overwrite, record_seconds=record_seconds
     )
+
+
+def read_subdivision(path: str | PathLike[str]) -> Previous:
+    """Read a file of parcels; see `urban_processing.layout_file.subdivisions`."""
+    return subdivisions.read_subdivision(path, library=PYOGRIO)
 
 
 def read_layout(path: str | PathLike[str], *, snap: float | None = None) -> GeoLayout:

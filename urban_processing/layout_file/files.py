@@ -17,7 +17,12 @@ import shapely
 from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
 from urban_processing.layout import NOT_FIXED, GivenStreet, Layout
-from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
+from urban_processing.layout_file.geopackage import (
+    LAYOUT_STATE,
+    LayerLibrary,
+    read_state,
+    write_geopackage,
+)
 from urban_processing.layout_file.writing import check_output, replacing
 from urban_processing.mesh.places import line_segments, vertices_at
 from urban_processing.metrics.tables import layout_tables
@@ -85,7 +90,7 @@ def write_layout(
             temporary,
             {layer(name): table for name, table in known.items()},
             crs=layout.frame.crs,
-            state=_state(layout),
+            state=(LAYOUT_STATE, _state(layout)),
             library=library,
         )
     return target
@@ -257,7 +262,7 @@ def _state(layout: Layout) -> str:
 def _read_state(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise BoundaryError(f"The file {path} does not exist.")
-    text = read_state(path)
+    text = read_state(path, LAYOUT_STATE)
     if text is None:
         raise BoundaryError(
             f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,9 +10,12 @@ from os import PathLike
 from pathlib import Path
 
 from urban_processing.errors import OutputError
-from urban_processing.layout_file.geopackage import LayerLibrary, write_geopackage
+from urban_processing.layout_file.geopackage import LAYERS_STATE, LayerLibrary, write_geopackage
 from urban_processing.paths import geopackage_problems
 from urban_processing.tables import LayerSet
+
+FILE_FORMAT = 1
+"""Number of the way in which files of layers keep what the schema does not say."""
 
 
 def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[str]:
@@ -68,8 +72,22 @@ def write_layer_set(
         raise OutputError(problems)
     layers = made.layers(record_seconds=record_seconds)
     with replacing(target) as temporary:
-        write_geopackage(temporary, layers, crs=made.frame.crs, library=library)
+        write_geopackage(
+            temporary,
+            layers,
+            crs=made.frame.crs,
+            library=library,
+            state=(LAYERS_STATE, _state(made)),
+        )
     return target
+
+
+def _state(made: LayerSet) -> str:
+    """Return what the layers do not say, as JSON."""
+    frame = made.frame
+    return json.dumps(
+        {"format": FILE_FORMAT, "kind": made.kind, "crs": frame.crs, "origin": list(frame.origin)}
+    )
 
 
 @contextmanager

@@ -39,6 +39,14 @@ class CornerLots(enum.StrEnum):
     STREET_LENGTH = "street-length"
 
 
+STRATEGY_LABELS = {
+    "skeleton": "Rows along the streets (skeleton)",
+    "obb": "Oriented boxes",
+    "hybrid": "Rows along the streets, boxes within",
+    "streamline": "Streamlines of a cross field",
+}
+"""Readable names of strategies."""
+
 MAX_OVER_MIN = 2.5
 """Largest area over the smallest one, where it is not given."""
 
@@ -63,12 +71,7 @@ class SubdivideParams(Params):
             "(obb), rows around boxes (hybrid), or cuts along a cross field (streamline).",
             group=_SIZE,
             per_feature=True,
-            labels={
-                "skeleton": "Rows along the streets (skeleton)",
-                "obb": "Oriented boxes",
-                "hybrid": "Rows along the streets, boxes within",
-                "streamline": "Streamlines of a cross field",
-            },
+            labels=STRATEGY_LABELS,
         ),
     ] = Strategy.SKELETON
     min_area: Annotated[

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,4 +170,41 @@ def sort_faces(pieces: Pieces) -> Pieces:
         lineage=pieces.lineage[order],
         level=pieces.level[order],
         patio=pieces.patio[order],
+    )
+
+
+def join_parts(parts: Sequence[tuple[IntArray, Pieces]], ground: Ground) -> Pieces:
+    """Join pieces of some polygons of the ground each to pieces of all of it.
+
+    Parameters
+    ----------
+    parts
+        Polygons of the ground, each of them in one part, and the pieces of ``ground.of`` these.
+    ground
+        The whole.
+    """
+    n = len(ground.rings.xy)
+    added = [pieces.xy[len(ground.of(rows).rings.xy) :] for rows, pieces in parts]
+    edge_of = [ground.rings.of(rows)[1] for rows, _ in parts]
+    first_added = n + np.append(0, np.cumsum([len(xy) for xy in added]))
+    vertex, face, n_faces, n_edges = [], [], 0, 0
+    offsets = [np.zeros(1, dtype=np.int64)]
+    for k, (_, pieces) in enumerate(parts):
+        own = np.append(edge_of[k], np.arange(first_added[k], first_added[k + 1]))
+        vertex.append(own[pieces.vertex])
+        face.append(pieces.face + n_faces)
+        offsets.append(pieces.offsets[1:] + n_edges)
+        n_faces, n_edges = n_faces + pieces.n_faces, n_edges + len(pieces.vertex)
+    return sort_faces(
+        Pieces(
+            xy=np.concatenate([ground.rings.xy, *added]),
+            vertex=np.concatenate(vertex),
+            offsets=np.concatenate(offsets),
+            face=np.concatenate(face),
+            access=np.concatenate([pieces.access for _, pieces in parts]),
+            block=np.concatenate([rows[pieces.block] for rows, pieces in parts]),
+            lineage=np.concatenate([pieces.lineage for _, pieces in parts]),
+            level=np.concatenate([pieces.level for _, pieces in parts]),
+            patio=np.concatenate([pieces.patio for _, pieces in parts]),
+        )
     )

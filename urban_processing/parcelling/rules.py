@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import enum
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -56,21 +56,18 @@ def rule_values(wanted: BlockRules) -> dict[str, npt.NDArray[np.object_]]:
     Given as columns they lead to the same rules.
     """
     rules = wanted.rules
-    values: dict[str, Any] = {
-        "strategy": wanted.strategy,
-        "offset": np.where(np.isinf(rules.offset), None, rules.offset.astype(object)),
-        "patio": wanted.patio,
-        "corner_lots": np.where(
-            rules.by_length, CornerLots.STREET_LENGTH.value, CornerLots.STREET_WIDTH.value
-        ),
-    }
-    names = per_block_parameters()
-    return {name: _plain(values.get(name, getattr(rules, name, None))) for name in names}
+    known: dict[str, list[Any]] = {f.name: getattr(rules, f.name).tolist() for f in fields(rules)}
+    known["strategy"] = [Strategy(v).value for v in wanted.strategy.tolist()]
+    known["patio"] = [Patio(v).value for v in wanted.patio.tolist()]
+    known["offset"] = [None if math.isinf(v) else v for v in known["offset"]]
+    lots = {True: CornerLots.STREET_LENGTH.value, False: CornerLots.STREET_WIDTH.value}
+    known["corner_lots"] = [lots[v] for v in known["by_length"]]
+    return {name: _objects(known[name]) for name in per_block_parameters()}
 
 
-def _plain(values: npt.NDArray[Any]) -> npt.NDArray[np.object_]:
+def _objects(values: list[Any]) -> npt.NDArray[np.object_]:
     out = np.empty(len(values), dtype=object)
-    out[:] = [v.value if isinstance(v, enum.Enum) else v for v in values.tolist()]
+    out[:] = values
     return out
 
 
@@ -87,7 +84,7 @@ def resolve_rules(
         Number of blocks.
     columns
         (n,) values that override parameters of the same name, block by block, already checked;
-        None where the parameter holds.
+        None or NaN where the parameter holds.
     """
     known = {} if columns is None else columns
     values = {name: _values(params, name, n, known) for name in per_block_parameters()}
@@ -130,7 +127,7 @@ def _values(
     general = getattr(params, name)
     out = np.full(n, general, dtype=object)
     if name in columns:
-        given = np.array([value is not None for value in columns[name]], dtype=bool)
+        given = np.array([v is not None and v == v for v in columns[name].tolist()], dtype=bool)
         out[given] = columns[name][given]
     return out
 
