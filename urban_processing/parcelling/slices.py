@@ -129,7 +129,7 @@ class Slicer:
         sheet = self.sheet
         for k in (edge, edge + 1):
             v = self.strip.back[k]
-            if abs(sheet.x[v] - hit.x) + abs(sheet.y[v] - hit.y) < CLOSE:
+            if math.hypot(sheet.x[v] - hit.x, sheet.y[v] - hit.y) < CLOSE:
                 return Hit(float(k), sheet.x[v], sheet.y[v])
         return hit
 
@@ -165,7 +165,7 @@ class Slicer:
         return s
 
     def _snapped(self, s: float) -> tuple[float, Hit]:
-        snap = self.bounds.snap
+        snap = max(self.bounds.snap, CLOSE)
         k = bisect.bisect(self.s, s)
         near = min(
             (self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1),
@@ -182,7 +182,7 @@ class Slicer:
         best: tuple[float, float, Hit] | None = None
         for share, vertex in [(0.0, u), *sheet.between(u, v), (1.0, v)]:
             x, y = sheet.x[vertex], sheet.y[vertex]
-            if abs(x - hit.x) + abs(y - hit.y) > 2.0 * snap:
+            if math.hypot(x - hit.x, y - hit.y) > 2.0 * snap:
                 continue
             t = (x - bay.x) * bay.dx + (y - bay.y) * bay.dy
             origin = bay.origin(t)
