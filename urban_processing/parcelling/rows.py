@@ -36,6 +36,9 @@ from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 LEAST_FRONT = 0.75
 """Shortest front of a strip, over the smallest width."""
 
+TURN = 0.8
+"""Length over which turns of a street count as one, over the depth of the deepest row."""
+
 TILED = 1e-9
 """Share of a polygon's area that its faces may miss or hold twice."""
 
@@ -157,10 +160,11 @@ def _alpha_strips(
 ) -> list[Strip]:
     """Return the α-strips, ranked by what does not depend on where rings begin."""
     x, y = polygon.xy.mean(axis=0).tolist()
+    depth = TURN * float(skeleton.height.max())
     streets = [
         street
         for ring in sides_of_rings(sheet, polygon, skeleton.edge_face.tolist())
-        for street in logical_streets(ring, (x, y), corner=corner, reach=needs.reach)
+        for street in logical_streets(ring, (x, y), corner=corner, reach=needs.reach, depth=depth)
     ]
     strips = alpha_strips(sheet, [face.tolist() for face in skeleton.faces], streets)
     strips.sort(
