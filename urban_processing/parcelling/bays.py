@@ -56,20 +56,20 @@ class Bay:
         self.length = math.hypot(ex, ey)
         self.dx, self.dy = ex / self.length, ey / self.length
         right, left = strip.guides.get(v), strip.guides.get(u)
-        n = len(strip.back) - 1
         begin = right if right is not None and last < len(strip.front) - 1 else None
         end = left if left is not None and first > 0 else None
-        self._window(sheet, strip, begin, end, n)
+        self._window(sheet, strip, begin=begin, end=end)
         self._knots(begin is not None, end is not None)
 
     def _window(
         self,
         sheet: Sheet,
         strip: Strip,
+        *,
         begin: tuple[float, float, float] | None,
         end: tuple[float, float, float] | None,
-        n: int,
     ) -> None:
+        n = len(strip.back) - 1
         low = begin[0] if begin is not None else 0.0
         high = max(end[0] if end is not None else float(n), low)
         spots = [] if begin is None else [begin]

@@ -10,8 +10,8 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from urban_processing.parcelling.bays import Bay, Hit, bays_of
-from urban_processing.parcelling.mending import sees
 from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.sight import sees
 from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
 from urban_processing.parcelling.strips import Strip
 
@@ -207,7 +207,7 @@ class Slicer:
         """Whether a line runs within the strip."""
         bay = self.bay_at(cut.s)
         px, py = bay.x + (cut.s - bay.start) * bay.dx, bay.y + (cut.s - bay.start) * bay.dy
-        return sees(self.sheet, self.ring, (px, py), (cut.hit.x, cut.hit.y))
+        return sees(self.sheet, self.ring, p=(px, py), q=(cut.hit.x, cut.hit.y))
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:
         """Add the ends of the lines to the sheet; return the parts of the strip between them."""
