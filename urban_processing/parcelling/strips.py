@@ -15,6 +15,7 @@ RIDGE = math.cos(math.radians(100.0))
 
 
 Edge = tuple[int, int]
+Guide = tuple[float, float, float]
 
 
 @dataclass
@@ -37,7 +38,7 @@ class Strip:
 
     front: list[int]
     back: list[int]
-    guides: dict[int, tuple[float, float, float]]
+    guides: dict[int, Guide]
     street: Street
     rank: int = 0
     corners: dict[int, tuple[float, float]] = field(default_factory=dict)
@@ -60,7 +61,7 @@ class Strip:
                 section = range(start, start + len(between) + 1)
                 self.guides[vertex] = self._prolonged(sheet, vertex, section)
 
-    def _prolonged(self, sheet: Sheet, vertex: int, section: range) -> tuple[float, float, float]:
+    def _prolonged(self, sheet: Sheet, vertex: int, section: range) -> Guide:
         """Where the guide of a vertex meets a section of the back, led on as it was."""
         _, gx, gy = self.guides[vertex]
         dx, dy = self.corners[vertex]
