@@ -48,6 +48,10 @@ _LAYERS = {
     InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
 }
 """Inputs that are layers, and their geometry."""
 
@@ -134,7 +138,7 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     for field in plain:
         if field not in first:
             yield _parameter(field)
-    if any(item.kind.is_ground for item in spec.inputs):
+    if any(item.kind.chooses_crs for item in spec.inputs):
         crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)
         yield _helped(crs, _CRS_HELP)
     for field in fields:
@@ -223,7 +227,8 @@ def _sink(sink: SinkName) -> QgsProcessingParameterFeatureSink:
         createByDefault=layer.shown,
     )
     columns = ", ".join(column.name for column in layer.columns)
-    return _helped(definition, f"Layer with the columns {columns}.")
+    more = ", and those carried along" if layer.open else ""
+    return _helped(definition, f"Layer with the columns {columns}{more}.")
 
 
 def _helped(

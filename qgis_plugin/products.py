@@ -48,6 +48,13 @@ class Product:
     write: Callable[[Path], object]
     plot: Callable[[Path], object]
 
+    def layer(self, declared: Layer) -> tuple[Layer, Table | None]:
+        """Return a layer as it was made, with columns that were given, and its rows if any."""
+        for made, table in self.layers.items():
+            if made.name == declared.name:
+                return made, table
+        return declared, None
+
 
 def product(kind: OutputKind, made: Any) -> Product:
     """Return what an algorithm made, with all that is worked out of it."""

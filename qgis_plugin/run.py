@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from qgis.core import QgsProcessingFeedback
 
 from qgis_plugin.crs import crs_of
+from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
 from qgis_plugin.products import product
@@ -71,9 +72,10 @@ def run(
     }
     for sink in destinations.sinks:
         whole = products[sink.output.name]
+        made_of, table = whole.layer(sink.layer)
         results[sink.parameter] = write_sink(
-            sink,
-            whole.layers.get(sink.layer),
+            SinkName(sink.output, made_of),
+            table,
             destinations,
             crs=whole.crs,
             group=groups[sink.output.name],

@@ -21,6 +21,7 @@ from qgis.core import (
     QgsProcessingFeedback,
     QgsWkbTypes,
 )
+from qgis.PyQt.QtCore import QDate, QDateTime, Qt, QTime
 
 from qgis_plugin.crs import QgisCrs
 from qgis_plugin.definitions import CRS, input_of, is_given, parameter_name
@@ -33,6 +34,7 @@ from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.block_values import block_columns
 from urban_processing.intake.blocks import build_blocks
+from urban_processing.intake.editions import EditionLayers, build_editions
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
@@ -44,11 +46,14 @@ from urban_processing.layout_file.subdivisions import read_subdivision
 from urban_processing.params import Params
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.parcelling.reuse import Previous
+from urban_processing.persistence.editions import Editions
 from urban_processing.site import Site
 
 if TYPE_CHECKING:
     from qgis_plugin.algorithm import SpecAlgorithm
 
+
+_TIMES = (QDate, QDateTime, QTime)
 
 _SNAP = "snap"
 """The parameter that edited layers are read with."""
@@ -95,6 +100,7 @@ class Sources:
             InputKind.CENTRELINES: self._streets,
             InputKind.BLOCK_LAYER: self._blocks,
             InputKind.SUBDIVISION: self._subdivision,
+            InputKind.PARCELS_BEFORE: self._editions,
         }
         inputs: dict[str, Any] = {}
         for item in self.algorithm.spec.inputs:
@@ -199,8 +205,31 @@ class Sources:
         crs = QgisCrs(self.context.transformContext())
         return build_layout(*found, library=crs, snap=snap or 0.0)
 
+    def _editions(self, item: Input) -> Editions | None:
+        """Read two states of a layout."""
+        before, after, *blocks = (
+            None
+            if (layer := input_of(self.algorithm.spec, kind)) is None
+            # the numbers of blocks and all other columns belong to parcels
+            else self._features(layer, None if layer.required else ())
+            for kind in (
+                item.kind,
+                InputKind.PARCELS_AFTER,
+                InputKind.BLOCKS_BEFORE,
+                InputKind.BLOCKS_AFTER,
+            )
+        )
+        if before is None or after is None:
+            return None
+        self.name = self.name or after.name
+        return build_editions(
+            EditionLayers(before, blocks[0]),
+            EditionLayers(after, blocks[1]),
+            library=QgisCrs(self.context.transformContext()),
+        )
+
     def _features(
-        self, item: Input, wanted: Sequence[str] = GIVEN_COLUMNS
+        self, item: Input, wanted: Sequence[str] | None = GIVEN_COLUMNS
     ) -> Features[QgsCoordinateReferenceSystem] | None:
         """Read a layer, or the features of it that are selected; None where none is given."""
         name = parameter_name(item.name)
@@ -212,7 +241,7 @@ class Sources:
                 )
             return None
         known = source.fields().names()
-        columns = [column for column in wanted if column in known]
+        columns = known if wanted is None else [name for name in wanted if name in known]
         rows = self._rows(source, name, columns)
         return Features(
             _objects([geometry for geometry, _ in rows]),
@@ -272,7 +301,9 @@ def _objects(values: Sequence[Any]) -> npt.NDArray[np.object_]:
 
 def _plain(value: Any) -> Any:
     """Return an attribute's value, None where QGIS has NULL."""
-    return None if value == NULL else value
+    if value == NULL:
+        return None
+    return value.toString(Qt.DateFormat.ISODate) if isinstance(value, _TIMES) else value
 
 
 def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:

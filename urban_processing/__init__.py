@@ -16,7 +16,7 @@ from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from urban_processing import errors
-    from urban_processing.api import cogenerate, find_blocks, optimize, subdivide
+    from urban_processing.api import cogenerate, find_blocks, optimize, subdivide, transfer
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.params.blocks import BlocksParams
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from urban_processing.params.optimize import OptimizeParams
     from urban_processing.params.rules import Preset
     from urban_processing.params.subdivide import Strategy, SubdivideParams
+    from urban_processing.params.transfer import TransferParams
 
 _HOME = {
     "BlocksParams": "urban_processing.params.blocks",
@@ -35,11 +36,13 @@ _HOME = {
     "Strategy": "urban_processing.params.subdivide",
     "StreetPattern": "urban_processing.params.cogenerate",
     "SubdivideParams": "urban_processing.params.subdivide",
+    "TransferParams": "urban_processing.params.transfer",
     "cogenerate": "urban_processing.api",
     "find_blocks": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
     "subdivide": "urban_processing.api",
+    "transfer": "urban_processing.api",
 }
 
 __all__ = [
@@ -52,6 +55,7 @@ __all__ = [
     "Strategy",
     "StreetPattern",
     "SubdivideParams",
+    "TransferParams",
     "__version__",
     "cogenerate",
     "errors",
@@ -59,6 +63,7 @@ __all__ = [
     "optimize",
     "read_layout",
     "subdivide",
+    "transfer",
 ]
 
 

@@ -12,6 +12,7 @@ from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
 from urban_processing.io.blocks import read_blocks, read_streets
 from urban_processing.io.boundaries import read_boundary
+from urban_processing.io.editions import read_editions
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_layout, read_subdivision
 from urban_processing.io.frames import GeoLayers, GeoLayout
@@ -23,11 +24,13 @@ from urban_processing.params.blocks import BlocksParams
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.params.subdivide import SubdivideParams
+from urban_processing.params.transfer import TransferParams
 from urban_processing.parcelling.reuse import Previous
 from urban_processing.pipelines import blocks as block_finding
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
 from urban_processing.pipelines import subdivide as subdivision
+from urban_processing.pipelines import transfer as persistence
 from urban_processing.pipelines.ground import given_layers
 from urban_processing.processes import process_pool
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
@@ -329,6 +332,68 @@ def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
     if given:
         raise BoundaryError(f"Streets are ready as they are: leave out {', '.join(given)}.")
     return source
+
+
+def transfer(
+    before: Source | GeoLayout,
+    after: Source | GeoLayout,
+    *,
+    blocks_before: Source | None = None,
+    blocks_after: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Give the parcels after an edit the numbers and columns of the same parcels before it.
+
+    Positions relative to the corners of blocks say which parcel is which (Vanegas 2012,
+    section 5). Numbers stay unique; new ones are above all old ones.
+
+    Parameters
+    ----------
+    before, after
+        Parcels: files, GeoDataFrames or geometries; or layouts, also as files: then their
+        streets say what a block is.
+    blocks_before, blocks_after
+        Polygons of blocks, or lines around them, likewise.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `TransferParams`.
+
+    Returns
+    -------
+    GeoLayers
+        The layers ``parcels`` and ``changes``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> before = [shapely.box(x, 0, x + 20, 30) for x in (0, 20, 40)]
+    >>> after = [shapely.box(x, 0, x + 22, 30) for x in (44, 0, 22)]
+    >>> made = transfer(before, after)
+    >>> made.parcels.parcel_id.tolist(), made.parcels.change.tolist()
+    ([1, 2, 3], ['moved', 'moved', 'moved'])
+    """
+    params = TransferParams.from_values(parameters)
+    old, new = _state(before, blocks_before), _state(after, blocks_after)
+    editions = read_editions(old[0], new[0], old[1], new[1])
+    return GeoLayers(persistence.transfer(editions, params, progress))
+
+
+def _state(parcels: Source | GeoLayout, blocks: Source | None) -> tuple[Source, Source | None]:
+    """Return parcels, and blocks or the streets between them where they are known."""
+    if not isinstance(parcels, GeoLayout):
+        return parcels, blocks
+    return parcels.parcels, parcels.streets if blocks is None else blocks
 
 
 def _layout(

@@ -77,6 +77,9 @@ class Layer:
         Readable name.
     shown
         Whether a toolbox that makes single layers makes this one unless told otherwise.
+    open
+        Whether columns that somebody gave may follow: then the layer made is another `Layer` of
+        the same name.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Layer:
     columns: tuple[Column, ...]
     title: str
     shown: bool = False
+    open: bool = False
 
     @property
     def column_names(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.provenance import Step, timeless
-from urban_processing.schema import ISSUES, PROVENANCE, ColumnType, Layer
+from urban_processing.schema import ISSUES, PROVENANCE, Column, ColumnType, Layer
 from urban_processing.site import FloatArray, Frame, Issue
 
 
@@ -39,6 +40,11 @@ class Table:
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(next(iter(self.columns.values())))
+
+    @property
+    def in_pieces(self) -> bool:
+        """Whether a geometry consists of several pieces."""
+        return bool((shapely.get_num_geometries(self.shapes) > 1).any())
 
     @property
     def shapes(self) -> npt.NDArray[np.object_]:
@@ -98,6 +104,39 @@ def make_table(
         else:
             columns[column.name] = np.asarray(given, dtype=column.dtype.value)
     return Table(columns, geometry)
+
+
+def with_columns(
+    layer: Layer, values: Mapping[str, npt.NDArray[Any]]
+) -> tuple[Layer, dict[str, npt.NDArray[Any]]]:
+    """Return a layer with more columns, and their values in the types that it declares."""
+    columns, typed = [], {}
+    for name, column in values.items():
+        kind, typed[name] = _typed(column)
+        columns.append(Column(name, kind, "", "As given.", name, nullable=True))
+    return dataclasses.replace(layer, columns=(*layer.columns, *columns)), typed
+
+
+def _typed(values: npt.NDArray[Any]) -> tuple[ColumnType, npt.NDArray[Any]]:
+    """Type of some values, any of which may be missing, and the values in it."""
+    plain = values.tolist() if values.dtype.kind != "M" else np.datetime_as_string(values).tolist()
+    missing = [value is None or value != value or value == "NaT" for value in plain]
+    there = [value for value, gap in zip(plain, missing, strict=True) if not gap]
+    if there and all(isinstance(value, bool | np.bool_) for value in there) and not any(missing):
+        return ColumnType.BOOLEAN, np.array(there, dtype=bool)
+    if there and all(isinstance(value, int | float | np.number) for value in there):
+        numbers = np.array(
+            [np.nan if gap else float(v) for v, gap in zip(plain, missing, strict=True)]
+        )
+        whole = all(isinstance(value, int | np.integer) for value in there)
+        exact = whole and (np.abs(numbers[~np.array(missing)]) < 2.0**53).all()
+        return (ColumnType.INTEGER if exact else ColumnType.REAL), numbers
+    texts = [None if gap else _text(v) for v, gap in zip(plain, missing, strict=True)]
+    return ColumnType.TEXT, objects(texts)
+
+
+def _text(value: Any) -> str:
+    return value.isoformat() if hasattr(value, "isoformat") else str(value)
 
 
 def numbers(values: Sequence[float | None]) -> FloatArray:

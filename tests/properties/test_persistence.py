@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from street_edits import town, turned
 
 from urban_processing.persistence.block_match import NONE, match_blocks
-from urban_processing.persistence.changes import Change
 from urban_processing.persistence.keys import fingerprints
+from urban_processing.persistence.layers import Change
 from urban_processing.persistence.transfer import in_blocks, transfer
 
 BASE = town()

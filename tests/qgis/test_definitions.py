@@ -32,6 +32,7 @@ SHELL_ONLY = {
     "cli": {
         *("place", "layer", "where"),  # QGIS has layers, filters and selections
         *("overwrite", "record_seconds", "export", "export_format", "quiet"),
+        "processes",  # the program that runs QGIS is not Python
     },
     "qgis": set[str](),
 }
@@ -59,7 +60,7 @@ def test_texts_are_those_of_the_declaration(algorithm: Any, spec: AlgorithmSpec)
     for source in spec.references:
         assert source in algorithm.shortHelpString()
     assert not algorithm.icon().isNull()
-    assert "parcels" in algorithm.tags()
+    assert {spec.name, "planning"} <= set(algorithm.tags())
 
 
 def test_names_are_those_of_the_command_line(algorithm: Any, spec: AlgorithmSpec) -> None:
@@ -124,6 +125,12 @@ INPUTS = {
     InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.CENTRELINES: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
 }
 
 
@@ -133,7 +140,7 @@ def test_inputs_are_layers_of_the_right_kind(algorithm: Any, spec: AlgorithmSpec
         asked = algorithm.parameterDefinition(item.name.upper())
         assert bool(asked.flags() & optional) is not item.required
         assert asked.description() == item.label
-        if item.kind is InputKind.LAYOUT:
+        if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION):
             assert isinstance(asked, QgsProcessingParameterFile)
         else:
             assert isinstance(asked, QgsProcessingParameterFeatureSource)
@@ -155,10 +162,8 @@ def test_results_are_sinks_and_files_and_all_optional(algorithm: Any, spec: Algo
     optional = QgsProcessingParameterDefinition.Flag.FlagOptional
     assert all(bool(d.flags() & optional) for d in made.values())
     by_default = {name for name, d in made.items() if d.createByDefault()}
-    shown = {
-        "blocks": ("BLOCKS", "BLOCK_EDGES", "ISSUES"),
-    }.get(spec.name, ("PARCELS", "STREETS", "JUNCTIONS", "ISSUES"))
-    assert by_default == {f"OUTPUT_{name}" for name in shown}
+    shown = {f"{o.name}_{layer.name}" for o in spec.outputs for layer in o.layers if layer.shown}
+    assert by_default == {name.upper() for name in shown}
     files = {n for n, d in made.items() if isinstance(d, QgsProcessingParameterFileDestination)}
     assert files == {"OUTPUT", "PLOT"}
     assert made["OUTPUT"].defaultFileExtension() == "gpkg"

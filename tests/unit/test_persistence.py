@@ -10,9 +10,9 @@ from street_edits import rows_of_lots, town, turned
 from urban_processing.blocks.model import Blocks, plain_blocks
 from urban_processing.errors import BoundaryError
 from urban_processing.persistence.block_match import NONE, carry_block_columns, match_blocks
-from urban_processing.persistence.changes import Change
 from urban_processing.persistence.contours import corners_of
 from urban_processing.persistence.keys import block_key, block_keys
+from urban_processing.persistence.layers import Change
 from urban_processing.persistence.relative import assign, relative_coordinates
 from urban_processing.persistence.transfer import ParcelsInBlocks, in_blocks, labelled, transfer
 from urban_processing.site import Frame

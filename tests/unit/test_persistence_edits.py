@@ -8,7 +8,7 @@ import shapely
 from street_edits import Town, town
 
 from urban_processing.persistence.block_match import NONE, match_blocks
-from urban_processing.persistence.changes import Change
+from urban_processing.persistence.layers import Change
 from urban_processing.persistence.transfer import Transfer, in_blocks, transfer
 
 BASE = town()
@@ -33,8 +33,11 @@ class Edit:
         return self.old_id[shapely.contains_xy(self.old, x, y)][0]
 
     def now(self, number):
-        """The new parcel of a number."""
-        return self.new[self.made.parcel_id == number][0]
+        """The new parcel of a number, or the one that it was merged into."""
+        log = self.made.changes
+        row = np.flatnonzero((self.old_id[log.old] == number) & (log.change != Change.SPLIT))[0]
+        assert log.new[row] != NONE, f"{number} is {log.change[row]}"
+        return self.new[log.new[row]]
 
     def touched(self):
         """Old parcels in blocks whose contour changed."""

@@ -40,6 +40,15 @@ class InputKind(enum.StrEnum):
     over in its place."""
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
+    PARCELS_BEFORE = "parcels before an edit"
+    """Polygons of parcels with all their columns; handed over with the three that follow, as
+    `Editions`."""
+    PARCELS_AFTER = "parcels after an edit"
+    """Polygons of parcels with all their columns."""
+    BLOCKS_BEFORE = "blocks before an edit"
+    """Polygons of blocks, or lines around them."""
+    BLOCKS_AFTER = "blocks after an edit"
+    """Polygons of blocks, or lines around them."""
 
     CENTRELINES = "centrelines of streets"
     """Lines of streets that blocks are found between; handed over as `StreetsOnLand`."""
@@ -60,6 +69,11 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
+        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
+
+    @property
+    def chooses_crs(self) -> bool:
+        """Whether the user may choose the CRS in which such an input is worked on."""
         return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
 
 

@@ -98,6 +98,27 @@ def _read_layout(
         return None
 
 
+def _read_editions(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read the two states of a layout; None where one was not given or is added to `problems`."""
+    del item
+    by_kind = {i.kind: given[i.name] for i in spec.inputs}
+    missing = [
+        i for i in spec.inputs if i.required and given[i.name] is None and i.kind in _EDITIONS
+    ]
+    problems += [f"Give {option_name(i.name).upper()}, {_lower_first(i.help)}" for i in missing]
+    if missing:
+        return None
+    from urban_processing.io.editions import read_editions
+
+    try:
+        return read_editions(*(by_kind[kind] for kind in _EDITIONS))
+    except UrbanError as error:
+        problems += error.problems
+        return None
+
+
 def _snap(spec: AlgorithmSpec, given: Mapping[str, Any]) -> float | None:
     """Tolerance with which edited layers are read, the default where it is no number.
 
@@ -220,12 +241,20 @@ def _values(spec: AlgorithmSpec, given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: given[name] for name in names if given[name] is not None}
 
 
+_EDITIONS = (
+    InputKind.PARCELS_BEFORE,
+    InputKind.PARCELS_AFTER,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
+)
+
 _READERS: Mapping[InputKind, _Reader] = {
     InputKind.BOUNDARY: _read_boundary,
     InputKind.LAYOUT: _read_layout,
     InputKind.CENTRELINES: _read_centrelines,
     InputKind.BLOCK_LAYER: _read_blocks,
     InputKind.SUBDIVISION: _read_subdivision,
+    InputKind.PARCELS_BEFORE: _read_editions,
 }
 """What reads an input of a kind; inputs of other kinds are read together with one of these."""
 

@@ -105,6 +105,8 @@ _BY_OPTION = (
     InputKind.BLOCK_STREETS,
     InputKind.SUBDIVISION,
     InputKind.LAND,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
 )
 """Inputs that are options; the others are arguments."""
 
@@ -119,7 +121,7 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
-    if item.kind is InputKind.LAYOUT:
+    if not item.kind.chooses_crs:
         return [argument]
     if item.kind is not InputKind.BOUNDARY:
         return [argument, *_choice_of_features()]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from os import PathLike, fspath
-
 import numpy as np
 import numpy.typing as npt
 import pyproj
@@ -14,7 +12,7 @@ from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.sites import build_site
 from urban_processing.io.crs import PYPROJ, asked_crs
-from urban_processing.io.features import Source, read_features
+from urban_processing.io.features import Source, read_features, split_layer_name
 from urban_processing.site import Site
 
 
@@ -140,10 +138,7 @@ def _read_given(
 
 def _read_layer(source: Source, kind: str) -> Features[pyproj.CRS]:
     """Read a layer with geometries of a kind; its file may be followed by a layer's name."""
-    layer = None
-    if isinstance(source, str | PathLike):
-        path, _, name = fspath(source).partition("|layername=")
-        source, layer = path, name or None
+    source, layer = split_layer_name(source)
     return read_features(source, layer=layer, kind=kind, columns=GIVEN_COLUMNS)
 
 

@@ -35,7 +35,7 @@ def read_features(
     layer: str | None = None,
     where: str | None = None,
     kind: str = "polygon",
-    columns: Sequence[str] = (),
+    columns: Sequence[str] | None = (),
 ) -> Features[pyproj.CRS]:
     """Read the features of a file, or take those of a frame or of shapely geometries.
 
@@ -50,7 +50,7 @@ def read_features(
     kind
         Geometry that is looked for where a file has several layers: polygon, line or point.
     columns
-        Attributes that are wanted where the source has them.
+        Attributes that are wanted where the source has them; None for all.
 
     Raises
     ------
@@ -77,8 +77,22 @@ def read_features(
     return Features(_as_geometries(source), None, "The geometry", bare=True)
 
 
-def _columns_of(frame: Any, columns: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
-    """Wanted columns of a GeoDataFrame; a GeoSeries has none. None for values that are missing."""
+def split_layer_name(source: Source) -> tuple[Source, str | None]:
+    """Split a file from the layer named after it, as in ``file.gpkg|layername=roads``."""
+    if not isinstance(source, str | PathLike):
+        return source, None
+    path, _, name = fspath(source).partition("|layername=")
+    return path, name or None
+
+
+def _columns_of(frame: Any, columns: Sequence[str] | None) -> dict[str, npt.NDArray[Any]]:
+    """Wanted columns of a GeoDataFrame; a GeoSeries has none. None for values that are missing.
+
+    Where all columns are wanted, those of the index are among them.
+    """
+    if columns is None:
+        frame = frame.reset_index() if any(frame.index.names) else frame
+        columns = [name for name in getattr(frame, "columns", ()) if name != frame.geometry.name]
     known = getattr(frame, "columns", ())
     out = {}
     for name in (name for name in columns if name in known):
@@ -139,7 +153,7 @@ def _must_exist(path: str) -> None:
 
 
 def _read_parquet(
-    path: str, layer: str | None, where: str | None, columns: Sequence[str]
+    path: str, layer: str | None, where: str | None, columns: Sequence[str] | None
 ) -> Features[pyproj.CRS]:
     import geopandas
 
@@ -164,7 +178,7 @@ def _read_parquet(
 
 
 def _read_file(
-    path: str, layer: str | None, where: str | None, kind: str, columns: Sequence[str]
+    path: str, layer: str | None, where: str | None, kind: str, columns: Sequence[str] | None
 ) -> Features[pyproj.CRS]:
     _must_exist(path)
     layer = _choose_layer(path, layer, kind)
@@ -173,7 +187,7 @@ def _read_file(
             path,
             layer=layer,
             where=where,
-            columns=list(columns),
+            columns=None if columns is None else list(columns),
             force_2d=True,
             read_geometry=True,
         )

@@ -66,7 +66,12 @@ def _write_layer(path: Path, layer: Layer, table: Table, *, crs: str) -> None:
     options: dict[str, Any] = {"layer_options": {"IDENTIFIER": layer.title}}
     if spatial:
         kind = "Unknown" if layer.geometry is GeometryType.ANY else layer.geometry.value
-        options |= {"geometry_type": kind, "crs": crs or None, "promote_to_multi": False}
+        several = layer.geometry is not GeometryType.ANY and table.in_pieces
+        options |= {
+            "geometry_type": f"Multi{kind}" if several else kind,
+            "crs": crs or None,
+            "promote_to_multi": several,
+        }
         options["layer_options"] |= {
             "GEOMETRY_NAME": GEOMETRY_COLUMN,
             "SPATIAL_INDEX": "YES",

@@ -55,6 +55,8 @@ def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     if name not in _RULES:
         return None
     rules = _RULES[name]()
+    if name == "parcels" and "irregularity" not in layer.column_names:
+        rules = _changed()  # parcels that were not measured, but carried over
     if places_only and layer.geometry is GeometryType.ANY:
         rules = [rule for rule in rules if rule.symbol == "marker"]
     root = ET.Element(
@@ -247,7 +249,23 @@ def _issues() -> list[_Rule]:
     ]
 
 
+def _changed() -> list[_Rule]:
+    """Colour parcels by what became of them."""
+    return [
+        _Rule(label, f"\"change\" = '{change}'", [_fill(colour)], "fill")
+        for change, label, colour in (
+            ("kept", "Kept", _PAPER),
+            ("moved", "Moved", "250,226,160,255"),
+            ("split", "Split off", "244,190,112,255"),
+            ("new", "New", "226,125,85,255"),
+            ("merged", "Merged", "178,178,190,140"),
+            ("gone", "Gone", "120,120,130,140"),
+        )
+    ]
+
+
 _RULES = {
+    "changes": _changed,
     "parcels": _parcels,
     "streets": _streets,
     "junctions": _junctions,

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import bisect
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.strips import Strip
 
 TINY = 1e-6
+
+STEEP = 0.05
+"""A part of the back that leans by less from a line, along it, is met at its nearer end."""
 
 
 class Hit(NamedTuple):
@@ -44,9 +48,7 @@ class Bay:
         Places of its ends in the front.
     """
 
-    def __init__(
-        self, sheet: Sheet, strip: Strip, start: float, *, first: int, last: int
-    ) -> None:
+    def __init__(self, sheet: Sheet, strip: Strip, start: float, *, first: int, last: int) -> None:
         u, v = strip.front[first], strip.front[last]
         self.start, self.first, self.last = start, first, last
         self.x, self.y = sheet.x[u], sheet.y[u]
@@ -83,7 +85,7 @@ class Bay:
             px, py = px - self.x, py - self.y
             self.t.append(px * self.dx + py * self.dy)
             self.h.append(py * self.dx - px * self.dy)
-        self.falling = all(b <= a for a, b in zip(self.t, self.t[1:], strict=False))
+        self.falling = all(b <= a for a, b in pairwise(self.t))
         self.negative = [-t for t in self.t] if self.falling else []
 
     def _knots(self, right: bool, left: bool) -> None:
@@ -107,14 +109,14 @@ class Bay:
 
     def target(self, s: float) -> float:
         """Where along the run a line from ``s`` ends."""
-        for (s0, t0), (s1, t1) in zip(self.knots, self.knots[1:], strict=False):
+        for (s0, t0), (s1, t1) in pairwise(self.knots):
             if s <= s1:
                 return t0 + (s - s0) * (t1 - t0) / (s1 - s0)
         return self.knots[-1][1]
 
     def origin(self, t: float) -> float | None:
         """Where along the run the line begins that ends at ``t``; None if there is none."""
-        for (s0, t0), (s1, t1) in zip(self.knots, self.knots[1:], strict=False):
+        for (s0, t0), (s1, t1) in pairwise(self.knots):
             if t0 <= t <= t1 and t1 > t0:
                 return s0 + (t - t0) * (s1 - s0) / (t1 - t0)
         return None
@@ -137,22 +139,23 @@ class Bay:
             a, b = spots[k], spots[k + 1]
             if not (min(a, b) <= t <= max(a, b)):
                 continue
-            shares = ((t - a) / (b - a),) if a != b else (0.0, 1.0)
-            for share in shares:
-                h = self.h[k] + share * (self.h[k + 1] - self.h[k])
-                if h > TINY and (best is None or h < best[0]):
-                    best = (h, k, share)
+            rise = self.h[k + 1] - self.h[k]
+            if abs(b - a) > STEEP * abs(rise):
+                share = (t - a) / (b - a)
+            else:
+                share = 0.0 if (rise > 0.0) == (self.h[k] > TINY) else 1.0
+            h = self.h[k] + share * rise
+            if h > TINY and (best is None or h < best[0]):
+                best = (h, k, share)
         if best is None:
             k = min(range(last + 1), key=lambda j: abs(spots[j] - t))
             return self._hit(self.at[k], spots[k], self.h[k])
         h, k, share = best
         at = self.at[k] + share * (self.at[k + 1] - self.at[k])
-        return self._hit(at, t, h)
+        return self._hit(at, spots[k] + share * (spots[k + 1] - spots[k]), h)
 
     def _hit(self, at: float, t: float, h: float) -> Hit:
-        return Hit(
-            at, self.x + t * self.dx - h * self.dy, self.y + t * self.dy + h * self.dx
-        )
+        return Hit(at, self.x + t * self.dx - h * self.dy, self.y + t * self.dy + h * self.dx)
 
 
 def bays_of(sheet: Sheet, strip: Strip) -> list[Bay]:

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.parcelling.rings import Rings, ranges, starts
+from urban_processing.parcelling.rings import Rings, changes, ranges, starts
 
 EQUAL_AREA = 1e-3
 """Boxes whose areas differ by less than this share count as equally large."""
@@ -17,7 +17,7 @@ EQUAL_SIDES = 1e-6
 """Sides of boxes that differ by less than this share count as equally long."""
 
 MANY_VERTICES = 24
-"""From so many vertices on the box is that of the convex hull, which is the same."""
+"""From so many vertices on extents are those of the convex hull, which are the same."""
 
 LEAST_EDGE = 1e-5
 """Edges shorter than this, in metres, have no direction."""
@@ -52,10 +52,12 @@ class Boxes:
 
     def turned(self, rows: BoolArray) -> Boxes:
         """Return the boxes, in `rows` with their axis along the other side."""
-        across = np.column_stack([-self.axis[:, 1], self.axis[:, 0]])
+        across = np.empty_like(self.axis)
+        across[:, 0], across[:, 1] = -self.axis[:, 1], self.axis[:, 0]
+        across[across @ UPWARD < 0.0] *= -1.0
         return Boxes(
             centre=self.centre,
-            axis=np.where(rows[:, None], _upward(across), self.axis),
+            axis=np.where(rows[:, None], across, self.axis),
             length=np.where(rows, self.width, self.length),
             width=np.where(rows, self.length, self.width),
         )
@@ -64,53 +66,53 @@ class Boxes:
 def smallest_boxes(rings: Rings, xy: FloatArray) -> Boxes:
     """Return the box of smallest area around each face (Vanegas 2012, section 4.3).
 
-    The smallest box lies along an edge of the convex hull. Among boxes of equal area
+    Boxes lie along an edge of the face. Among those of equal area
     (`EQUAL_AREA`) the longest is taken, among those of equal sides the one whose direction
     comes first from the x-axis on: a triangle stands on its longest side, and which vertex a
     ring begins with does not matter. The axis lies along the longer side; where both are equal
     along the side that comes first from the x-axis on.
     """
-    corners, first = _outlines(rings, xy)
-    origin = corners[first[:-1]]
-    corners = corners - np.repeat(origin, np.diff(first), axis=0)
-    found = _best_directions(corners, first)
-    centre = found.centre
-    long = found.length >= found.width * (1.0 - EQUAL_SIDES)
-    turned = Boxes(centre, found.axis, found.length, found.width).turned(~long)
-    return Boxes(centre + origin, turned.axis, turned.length, turned.width)
-
-
-def _outlines(rings: Rings, xy: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Vertices of the shells, or of their convex hulls where they are many, and their starts."""
     shell = rings.face_rings[:-1]
     size = rings.size[shell]
-    first = rings.offsets[shell]
-    if (size <= MANY_VERTICES).all():
-        return xy[rings.vertex[ranges(first, size)]], starts(size)
-    many = np.flatnonzero(size > MANY_VERTICES)
-    points = xy[rings.vertex[ranges(first[many], size[many])]]
+    edges = xy[rings.vertex[ranges(rings.offsets[shell], size)]]
+    first = starts(size)
+    origin = edges[first[:-1]]
+    edges -= origin.repeat(size, axis=0)
+    found = _best_directions(edges, first, _outlines(edges, first))
+    turned = found.turned(found.length < found.width * (1.0 - EQUAL_SIDES))
+    return Boxes(turned.centre + origin, turned.axis, turned.length, turned.width)
+
+
+def _outlines(corners: FloatArray, first: IntArray) -> tuple[FloatArray, IntArray]:
+    """Corners of the rings, or of their convex hulls where they are many, and their starts."""
+    size = first[1:] - first[:-1]
+    many = (size > MANY_VERTICES).nonzero()[0]
+    if not len(many):
+        return corners, first
+    points = corners[ranges(first[many], size[many])]
     of = np.repeat(np.arange(len(many)), size[many])
     hulls = shapely.convex_hull(shapely.multipoints(shapely.points(points), indices=of))
     hull_xy, hull = shapely.get_coordinates(shapely.get_exterior_ring(hulls), return_index=True)
-    hull_xy, hull = hull_xy[np.diff(hull, append=-1) == 0], hull[np.diff(hull, append=-1) == 0]
-    hull_size = np.bincount(hull, minlength=len(many))
-    pool = np.concatenate([xy[rings.vertex], hull_xy])
-    size, first = size.copy(), first.copy()
+    kept = ~changes(hull)  # the closing point is there twice
+    hull_xy, hull_size = hull_xy[kept], np.bincount(hull[kept], minlength=len(many))
+    size, begin = size.copy(), first[:-1].copy()
     size[many] = hull_size
-    first[many] = len(rings.vertex) + starts(hull_size)[:-1]
-    return pool[ranges(first, size)], starts(size)
+    begin[many] = len(corners) + starts(hull_size)[:-1]
+    return np.concatenate([corners, hull_xy])[ranges(begin, size)], starts(size)
 
 
-def _best_directions(corners: FloatArray, first: IntArray) -> Boxes:
-    """Box of each outline, with its axis in the first quadrant; centres are relative."""
-    size = np.diff(first)
-    axis, usable = _edge_directions(corners, first)
-    outline = np.repeat(np.arange(len(size)), size)
-    # every direction of an outline with every one of its corners
-    each = size[outline]
-    row = ranges(first[:-1][outline], each)
+def _best_directions(
+    edges: FloatArray, first: IntArray, outline: tuple[FloatArray, IntArray]
+) -> Boxes:
+    """Box of each ring along one of its edges, with its axis in the first quadrant."""
+    axis, usable = _edge_directions(edges, first)
+    ring = np.arange(len(first) - 1).repeat(first[1:] - first[:-1])
+    # every direction of a ring with every corner of its outline
+    corners, begin = outline
+    each = (begin[1:] - begin[:-1])[ring]
+    row = ranges(begin[:-1][ring], each)
     x, y = corners[:, 0][row], corners[:, 1][row]
-    cos, sin = np.repeat(axis[:, 0], each), np.repeat(axis[:, 1], each)
+    cos, sin = axis[:, 0].repeat(each), axis[:, 1].repeat(each)
     along, across = x * cos + y * sin, y * cos - x * sin
     group = starts(each)[:-1]
     low, high = np.minimum.reduceat(along, group), np.maximum.reduceat(along, group)
@@ -119,9 +121,9 @@ def _best_directions(corners: FloatArray, first: IntArray) -> Boxes:
     best = _choose(length, width, np.where(usable, _turn(axis), np.inf), first)
     u, v = 0.5 * (low + high)[best], 0.5 * (left + right)[best]
     chosen = axis[best]
-    centre = np.column_stack(
-        [u * chosen[:, 0] - v * chosen[:, 1], u * chosen[:, 1] + v * chosen[:, 0]]
-    )
+    centre = np.empty_like(chosen)
+    centre[:, 0] = u * chosen[:, 0] - v * chosen[:, 1]
+    centre[:, 1] = u * chosen[:, 1] + v * chosen[:, 0]
     return Boxes(centre, chosen, length[best], width[best])
 
 
@@ -160,7 +162,3 @@ def _choose(length: FloatArray, width: FloatArray, turn: FloatArray, first: IntA
     equal &= rank <= np.repeat(np.minimum.reduceat(rank, group), size)
     places = np.where(equal, np.arange(len(turn)), len(turn))
     return np.asarray(np.minimum(np.minimum.reduceat(places, group), len(turn) - 1))
-
-
-def _upward(axis: FloatArray) -> FloatArray:
-    return np.where((axis @ UPWARD < 0.0)[:, None], -axis, axis)

@@ -54,8 +54,10 @@ class Faces:
         Their rings and their smallest boxes.
     area
         (K,) in m².
-    least, min_width, snap
-        (K,) smallest area, smallest width, and distance within which cuts go through corners.
+    least, largest
+        (K,) smallest area of a piece, and the largest that is not halved again.
+    min_width, snap
+        (K,) smallest width, and distance within which cuts go through corners.
     narrowest
         (K,) width that pieces may have if `min_width` cannot be kept.
     shift
@@ -68,6 +70,7 @@ class Faces:
     boxes: Boxes
     area: FloatArray
     least: FloatArray
+    largest: FloatArray
     min_width: FloatArray
     snap: FloatArray
     narrowest: FloatArray
@@ -85,6 +88,7 @@ class Faces:
             boxes=self.boxes.take(rows),
             area=self.area[rows],
             least=self.least[rows],
+            largest=self.largest[rows],
             min_width=self.min_width[rows],
             snap=self.snap[rows],
             narrowest=self.narrowest[rows],
@@ -118,17 +122,22 @@ class View:
             self.faces.take(rows), self.sweep.take(rows), self.regular[rows], self.snapped[rows]
         )
 
-    def at_share(self, share: float) -> FloatArray:
-        """(K,) place with a share of the area before it, or as near as the smallest area allows."""
-        least = _clear_of_least(self.faces)
-        wanted = np.clip(share * self.faces.area, least, self.faces.area - least)
-        place = self.sweep.places(wanted, np.zeros(len(wanted)))
-        return _through_holes(self.faces, self.sweep, place)
+    def at_shares(self, rows: IntArray, shares: FloatArray) -> FloatArray:
+        """Places with shares of the area before them, or as near as the smallest area allows.
+
+        `rows`: the face of each; where a face comes up several times, so do its places.
+        """
+        if not len(rows):
+            return np.empty(0)
+        faces, sweep = self.faces.take(rows), self.sweep.take(rows)
+        least = _clear_of_least(faces)
+        wanted = np.minimum(np.maximum(shares * faces.area, least), faces.area - least)
+        return _through_holes(faces, sweep, sweep.places(wanted, np.zeros(len(rows))))
 
 
 def view_along(faces: Faces, xy: FloatArray, contour: Contour, *, turned: bool) -> View:
     """Look at faces along the axes of their boxes, or along the other ones."""
-    boxes = faces.boxes.turned(np.full(len(faces), turned))
+    boxes = faces.boxes.turned(np.ones(len(faces), dtype=bool)) if turned else faces.boxes
     sweep = sweep_along(faces.rings, xy, boxes)
     regular = _regular(faces, sweep)
     return View(faces, sweep, regular, _snapped(faces, sweep, regular, contour))
@@ -138,8 +147,8 @@ def _regular(faces: Faces, sweep: Sweep) -> FloatArray:
     place = _through_holes(faces, sweep, faces.shift)
     area = sweep.areas(place)
     least = _clear_of_least(faces)
-    wanted = np.clip(area, least, faces.area - least)
-    off = np.flatnonzero((wanted != area) & (faces.rings.n_rings == 1))
+    wanted = np.minimum(np.maximum(area, least), faces.area - least)
+    off = ((wanted != area) & (faces.rings.n_rings == 1)).nonzero()[0]
     if len(off):
         place = place.copy()
         place[off] = sweep.take(off).places(wanted[off], place[off])
@@ -156,13 +165,13 @@ def _snapped(faces: Faces, sweep: Sweep, place: FloatArray, contour: Contour) ->
     Not where one side would be too small, nor in faces with holes.
     """
     first = faces.rings.face_nodes
-    count = np.diff(first)
-    away = np.abs(sweep.along - np.repeat(place, count))
-    near = contour.corners(faces.rings.vertex) & (away <= np.repeat(faces.snap, count))
+    count = first[1:] - first[:-1]
+    away = np.abs(sweep.along - place.repeat(count))
+    near = contour.corners(faces.rings.vertex) & (away <= faces.snap.repeat(count))
     if not near.any():
         return place
     steps = np.where(near, np.round(away / TOUCH), np.inf)
-    least = np.repeat(np.minimum.reduceat(steps, first[:-1]), count)
+    least = np.minimum.reduceat(steps, first[:-1]).repeat(count)
     nearest = np.where(near & (steps <= least), sweep.along, np.inf)
     corner = np.minimum.reduceat(nearest, first[:-1])
     moved = np.isfinite(corner) & (faces.rings.n_rings == 1)

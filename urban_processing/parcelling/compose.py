@@ -103,9 +103,7 @@ def replace_faces(pieces: Pieces, faces: IntArray, sub: Pieces) -> Pieces:
     origin = np.concatenate([kept, faces[sub.block]])
     order = np.argsort(origin, kind="stable")
     access = np.concatenate([pieces.access[left.segment], sub.access])
-    edges = Rings(
-        together.vertex, np.arange(len(together.vertex)), together.offsets, together.face
-    )
+    edges = Rings(together.vertex, np.arange(len(access)), together.offsets, together.face)
     edge = edges.take(order).segment
     noded, source = node_rings(together.take(order), xy, _segments(pair, xy), n_fixed=n_old)
     return Pieces(

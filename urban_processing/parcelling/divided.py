@@ -56,7 +56,7 @@ class Polygon:
 
 @dataclass(frozen=True)
 class Face:
-    """A piece of a polygon: its rings of vertices, the shell first, and what `Pieces` says of it."""
+    """A piece of a polygon: its rings of vertices, the shell first, and what `Pieces` says."""
 
     rings: list[list[int]]
     lineage: int

@@ -13,8 +13,8 @@ from urban_processing.parcelling.line_cuts import TOUCH, Cut, Lines, cut
 from urban_processing.parcelling.rings import Rings, changes, ranges
 from urban_processing.site import AREA_ROUNDING
 
-OTHER_SHARES = (1 / 3, 2 / 3)
-"""Shares of the area before the cut that are tried where halves will not do."""
+SHARES = (1 / 2, 1 / 3, 2 / 3)
+"""Shares of the area before the cut that are tried where the regular cut will not do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,25 @@ class _Choice:
     place: FloatArray
     turned: BoolArray
 
-    def take(self, which: IntArray) -> _Choice:
-        return _Choice(self.row[which], self.place[which], self.turned[which])
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Cuts that were tried: whether all bounds hold, all but the width, or no area is too small."""
+
+    choice: _Choice
+    lines: Lines
+    cut: Cut
+    good: BoolArray
+    fair: BoolArray
+    small: BoolArray
+
+    def made(self, chosen: BoolArray) -> Halved:
+        """Make the first of the chosen cuts of each face."""
+        row = self.choice.row
+        best = chosen.nonzero()[0]
+        best = best[changes(row[best])]
+        lines = Lines(self.lines.point[best], self.lines.normal[best])
+        return Halved(row[best], _cut_of(self.cut, best), lines)
 
 
 def halve(faces: Faces, xy: FloatArray, contour: Contour) -> list[Halved]:
@@ -66,30 +83,33 @@ def halve(faces: Faces, xy: FloatArray, contour: Contour) -> list[Halved]:
     Tried in turn: the regular cut through a corner of the contour, where one is near; the
     regular cut; the one that halves the area, if a piece was too small; the regular cut along
     the other axis, through a corner if near; that cut without it; cuts at half of the area along
-    both axes, then at other shares of it. Where none keeps `min_width`, the first that keeps
-    `narrowest` is made.
+    both axes, then at other shares of it. A cut will do if its pieces keep `least` and `min_width`
+    and, where access is needed, have it, and have fronts for all the parcels they will become. If
+    none will, the first is made whose pieces keep `least` and `narrowest` and have access.
     """
-    everyone = np.arange(len(faces))
+    left = np.ones(len(faces), dtype=bool)
     along = view_along(faces, xy, contour, turned=False)
-    choice = _choice([(everyone, along.snapped, False)])
-    halved, spare, small = _try(faces, choice, xy, contour)
-    done, spares = [halved], [spare]
-    rest = _left(everyone, done)
+    choice = _choice([(np.arange(len(faces)), along.snapped, False)])
+    trials = [_tried(faces, choice, xy, contour)]
+    done = [trials[0].made(trials[0].good)]
+    left[done[0].rows] = False
+    rest = left.nonzero()[0]
     if len(rest):
         along = along.take(rest)
         across = view_along(along.faces, xy, contour, turned=True)
-        choice = _second_choice(rest, along, across, small[rest])
-        halved, spare, _ = _try(faces, choice, xy, contour)
-        done.append(halved)
-        spares.append(spare)
-        still = _left(rest, done)
+        choice = _second_choice(rest, along, across, trials[0].small[rest])
+        trials.append(_tried(faces, choice, xy, contour))
+        done.append(trials[1].made(trials[1].good))
+        left[done[1].rows] = False
+        still = left[rest].nonzero()[0]
         if len(still):
-            at = np.searchsorted(rest, still)
-            choice = _last_choice(still, along.take(at), across.take(at))
-            halved, spare, _ = _try(faces, choice, xy, contour)
-            done.append(halved)
-            spares.append(spare)
-        done.append(_at_a_pinch(faces, xy, _left(still, done), spares))
+            choice = _last_choice(rest[still], along.take(still), across.take(still))
+            trials.append(_tried(faces, choice, xy, contour))
+            done.append(trials[2].made(trials[2].good))
+            left[done[2].rows] = False
+        for trial in trials:
+            done.append(trial.made(trial.fair & left[trial.choice.row]))
+            left[done[-1].rows] = False
     return [part for part in done if len(part.rows)]
 
 
@@ -100,7 +120,7 @@ def street_sides(rings: Rings, xy: FloatArray, axis: FloatArray, contour: Contou
     to the side that it faces most, and are measured along the box. So the second side of a corner
     parcel does not add to its width, and a rounded corner has two sides.
     """
-    node = np.flatnonzero(contour.access(rings.segment))
+    node = contour.access(rings.segment).nonzero()[0]
     face = rings.edge_face[node]
     edge = xy[rings.vertex[rings.following[node]]] - xy[rings.vertex[node]]
     along = edge[:, 0] * axis[face, 0] + edge[:, 1] * axis[face, 1]
@@ -119,7 +139,9 @@ def _choice(parts: list[tuple[IntArray, FloatArray, bool]]) -> _Choice:
     """Put cuts together, the better ones first: rows, places and if along the other axis."""
     row = np.concatenate([rows for rows, _, _ in parts])
     place = np.concatenate([places for _, places, _ in parts])
-    turned = np.concatenate([np.full(len(rows), turned) for rows, _, turned in parts])
+    turned = np.repeat([turned for _, _, turned in parts], [len(rows) for rows, _, _ in parts])
+    if len(parts) == 1:
+        return _Choice(row, place, turned)
     order = np.argsort(row, kind="stable")
     return _Choice(row[order], place[order], turned[order])
 
@@ -127,11 +149,10 @@ def _choice(parts: list[tuple[IntArray, FloatArray, bool]]) -> _Choice:
 def _second_choice(rows: IntArray, along: View, across: View, small: BoolArray) -> _Choice:
     """Other cuts of faces whose first one would not do; `small`: as a piece was too small."""
     moved = np.abs(along.regular - along.snapped) > TOUCH
-    halves = along.take(np.flatnonzero(small)).at_share(0.5) if small.any() else np.empty(0)
     return _choice(
         [
             (rows[moved], along.regular[moved], False),
-            (rows[small], halves, False),
+            (rows[small], along.at_shares(small.nonzero()[0], np.array(0.5)), False),
             (rows, across.snapped, True),
         ]
     )
@@ -140,67 +161,26 @@ def _second_choice(rows: IntArray, along: View, across: View, small: BoolArray) 
 def _last_choice(rows: IntArray, along: View, across: View) -> _Choice:
     """All that is left to be tried."""
     moved = np.abs(across.regular - across.snapped) > TOUCH
-    parts = [
-        (rows[moved], across.regular[moved], True),
-        (rows, along.at_share(0.5), False),
-        (rows, across.at_share(0.5), True),
-    ]
-    for share in OTHER_SHARES:
-        parts += [(rows, along.at_share(share), False), (rows, across.at_share(share), True)]
+    n, k = len(SHARES), len(rows)
+    each, share = np.tile(np.arange(k), n), np.repeat(SHARES, k)
+    parts = [(rows[moved], across.regular[moved], True)]
+    places = [view.at_shares(each, share).reshape(n, k) for view in (along, across)]
+    for at_along, at_across in zip(*places, strict=True):
+        parts += [(rows, at_along, False), (rows, at_across, True)]
     return _choice(parts)
 
 
-def _left(rows: IntArray, done: list[Halved]) -> IntArray:
-    """Return the rows that are not among those done."""
-    left = np.zeros(rows[-1] + 1 if len(rows) else 0, dtype=bool)
-    left[rows] = True
-    for part in done:
-        left[part.rows[part.rows < len(left)]] = False
-    return left.nonzero()[0]
-
-
-def _try(
-    faces: Faces, choice: _Choice, xy: FloatArray, contour: Contour
-) -> tuple[Halved, _Choice, BoolArray]:
-    """Halve faces by the first cut that keeps all bounds.
-
-    Returns also, for each face, the first cut whose pieces are only too narrow, and (C,) cuts
-    with a piece that is too small.
-    """
-    copies = faces.take(choice.row)
+def _tried(faces: Faces, choice: _Choice, xy: FloatArray, contour: Contour) -> _Trial:
+    """Cut faces and see what comes of it."""
+    is_all = len(choice.row) == len(faces) and len(changes(choice.row).nonzero()[0]) == len(faces)
+    copies = faces if is_all else faces.take(choice.row)
     lines = _lines(copies, choice)
-    tried = cut(copies.rings, xy, lines)
-    good, fair, small = _verdict(copies, tried, xy, contour)
-    best = _first_of_each(choice.row, good)
-    halved = Halved(
-        choice.row[best], _cut_of(tried, best), Lines(lines.point[best], lines.normal[best])
-    )
-    return halved, choice.take(_first_of_each(choice.row, fair)), small
-
-
-def _first_of_each(row: IntArray, chosen: BoolArray) -> IntArray:
-    """Return the first chosen place of each row; rows are in order."""
-    places = chosen.nonzero()[0]
-    return places[changes(row[places])]
-
-
-def _at_a_pinch(faces: Faces, xy: FloatArray, rows: IntArray, spares: list[_Choice]) -> Halved:
-    """Halve what can be halved, by the first cut whose pieces are only too narrow."""
-    row = np.concatenate([spare.row for spare in spares])
-    order = np.argsort(row, kind="stable")
-    order = order[_first_of_each(row[order], np.isin(row[order], rows))]
-    choice = _Choice(
-        row[order],
-        np.concatenate([spare.place for spare in spares])[order],
-        np.concatenate([spare.turned for spare in spares])[order],
-    )
-    copies = faces.take(choice.row)
-    lines = _lines(copies, choice)
-    return Halved(choice.row, cut(copies.rings, xy, lines), lines)
+    found = cut(copies.rings, xy, lines)
+    return _Trial(choice, lines, found, *_verdict(copies, found, xy, contour))
 
 
 def _lines(copies: Faces, choice: _Choice) -> Lines:
-    axis = copies.boxes.turned(choice.turned).axis
+    axis = copies.boxes.turned(choice.turned).axis if choice.turned.any() else copies.boxes.axis
     return Lines(copies.boxes.centre + choice.place[:, None] * axis, axis)
 
 
@@ -228,11 +208,16 @@ def _verdict(
     bad = too_small | (~reached & faces.needs_access[parent])
     bad |= front < faces.narrowest[parent] - MEASURED_M
     fair = ~_any(bad, parent, k) & (np.bincount(parent, minlength=k) > 1)
-    doubtful = np.flatnonzero(fair[parent])
+    doubtful = fair[parent].nonzero()[0]
     if len(doubtful):
         invalid = doubtful[~pieces.take(doubtful).are_valid(points)]
         fair[parent[invalid]] = False
-    good = fair & ~_any(front < faces.min_width[parent] - MEASURED_M, parent, k)
+    bad = front < faces.min_width[parent] - MEASURED_M
+    # so many parcels a piece will be at least, and each needs a front
+    n_parcels = np.ceil(area / faces.largest[parent] * (1.0 - AREA_ROUNDING))
+    cramped = sides.total < n_parcels * faces.narrowest[parent] - MEASURED_M
+    bad |= cramped & faces.needs_access[parent]
+    good = fair & ~_any(bad, parent, k)
     return good, fair, _any(too_small, parent, k)
 
 

@@ -105,17 +105,29 @@ def cut(rings: Rings, xy: FloatArray, lines: Lines) -> Cut:
 def _sides(across: FloatArray, along: FloatArray, following: IntArray) -> BoolArray:
     """(N,) nodes beyond the line.
 
-    Of those on it, ends of edges along it are on the side of these edges' faces, so that
-    no piece gets an edge without width; for the others both sides do.
+    Those on it are where no piece gets an edge without width and none touches itself: ends of
+    an edge along the line are on the side of the edge's face. A vertex with both neighbours on
+    one side is on that side too, unless it is reflex: then the line passes behind it.
     """
     beyond = across > TOUCH
-    on = np.abs(across) <= TOUCH
-    if on.any():
-        edge = np.flatnonzero(on & on[following])
-        edge = edge[along[following[edge]] < along[edge]]
-        beyond[edge] = True
-        beyond[following[edge]] = True
-    return np.asarray(beyond)
+    on = np.flatnonzero(np.abs(across) <= TOUCH)
+    if not len(on):
+        return beyond
+    previous = np.empty_like(following)
+    previous[following] = np.arange(len(following))
+    before, after = previous[on], following[on]
+    far = across[after] > 0.0
+    one_side = far == (across[before] > 0.0)
+    turn = (along[on] - along[before]) * (across[after] - across[on])
+    turn -= (across[on] - across[before]) * (along[after] - along[on])
+    reflex = turn > 0.0  # along the line and across it is a left-handed frame
+    beyond[on] = one_side & (far != reflex)
+    # neighbours on the line as well
+    lies = np.abs(across[after]) <= TOUCH
+    follows = np.abs(across[before]) <= TOUCH
+    beyond[on[lies]] = (along[after] < along[on])[lies]
+    beyond[on[follows]] = (along[on] < along[before])[follows]
+    return beyond
 
 
 def _crossings(

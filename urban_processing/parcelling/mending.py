@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from itertools import pairwise
 
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.strips import Strip
@@ -44,20 +45,41 @@ class Needs:
     snap: float
 
 
-def beta_strips(sheet: Sheet, strips: list[Strip], needs: Needs) -> list[Strip]:
+def beta_strips(
+    sheet: Sheet, strips: list[Strip], needs: Needs, patio: Set[tuple[int, int]]
+) -> tuple[list[Strip], list[Strip]]:
     """Make β-strips of α-strips (Vanegas 2012, sections 4.2.2 and 4.2.3).
 
     Strips too shallow for a parcel of the largest width are united with the one behind them, so
     that a block too shallow for two rows gets one; diagonal ends are mended; then strips too
     small for a parcel, and those without a street, go to the strip with which they share the
     longest border.
+
+    Parameters
+    ----------
+    sheet
+        The vertices.
+    strips
+        α-strips.
+    needs
+        What a strip must hold.
+    patio
+        Directed edges of patios.
+
+    Returns
+    -------
+    strips
+        β-strips, all of them on streets.
+    left
+        Strips without a street that have a longer border with a patio than with any of these.
     """
-    strips = _unite(sheet, strips, needs, shallow=True)
+    strips = _unite(sheet, strips, needs, shallow=True, patio=patio)
     for strip in strips:
         for other in strips:
             if strip is not other and strip.front[-1] == other.front[0]:
                 _mend(sheet, strip, other, needs)
-    return _unite(sheet, strips, needs, shallow=False)
+    strips, left = _give_rims(sheet, [s for s in strips if len(s.ring) > 2], patio)
+    return _unite(sheet, strips, needs, shallow=False, patio=frozenset()), left
 
 
 def _rank(strip: Strip, needs: Needs, *, widths: bool) -> tuple[bool, float, float]:
@@ -123,7 +145,7 @@ def _foot(sheet: Sheet, strip: Strip, apex: int, needs: Needs) -> tuple[int, flo
     x, y = sheet.x, sheet.y
     px, py = x[apex], y[apex]
     spots = []
-    for k, (u, v) in enumerate(zip(strip.front, strip.front[1:], strict=False)):
+    for k, (u, v) in enumerate(pairwise(strip.front)):
         ex, ey = x[v] - x[u], y[v] - y[u]
         share = ((px - x[u]) * ex + (py - y[u]) * ey) / (ex * ex + ey * ey)
         share = min(max(share, 0.0), 1.0)
@@ -147,9 +169,7 @@ def _foot(sheet: Sheet, strip: Strip, apex: int, needs: Needs) -> tuple[int, flo
     return None
 
 
-def sees(
-    sheet: Sheet, ring: Sequence[int], p: tuple[float, float], q: tuple[float, float]
-) -> bool:
+def sees(sheet: Sheet, ring: Sequence[int], p: tuple[float, float], q: tuple[float, float]) -> bool:
     """Whether the line between two points of a ring's boundary runs within the ring."""
     (px, py), (qx, qy) = p, q
     dx, dy = qx - px, qy - py
@@ -220,9 +240,36 @@ def _cut_back(sheet: Sheet, strip: Strip, start: int, stop: int) -> None:
     strip.splice(sheet, start, stop, [])
 
 
-def _unite(sheet: Sheet, strips: list[Strip], needs: Needs, *, shallow: bool) -> list[Strip]:
+def _give_rims(
+    sheet: Sheet, strips: Sequence[Strip], patio: Set[tuple[int, int]]
+) -> tuple[list[Strip], list[Strip]]:
+    """Give what has no street to the strips on streets, each to its longest border.
+
+    In each round borders are those before the round, so that none collects all around a hole.
+    """
+    streets = [strip for strip in strips if not strip.street.rim]
+    rims = [strip for strip in strips if strip.street.rim]
+    while True:
+        hosts = [_host(sheet, rim, streets, patio) for rim in rims]
+        given = [
+            host is not None and _absorb(sheet, host, rim)
+            for rim, host in zip(rims, hosts, strict=True)
+        ]
+        if not any(given):
+            return streets, rims
+        rims = [rim for rim, gone in zip(rims, given, strict=True) if not gone]
+
+
+def _unite(
+    sheet: Sheet,
+    strips: Sequence[Strip],
+    needs: Needs,
+    *,
+    shallow: bool,
+    patio: Set[tuple[int, int]],
+) -> list[Strip]:
     """Unite strips that cannot stand alone with others, the weakest first."""
-    strips = [strip for strip in strips if len(strip.ring) > 2]
+    strips = list(strips)
     barred: set[int] = set()
     while len(strips) > 1:
         weak = [
@@ -233,7 +280,7 @@ def _unite(sheet: Sheet, strips: list[Strip], needs: Needs, *, shallow: bool) ->
         if not weak:
             break
         strip = min(weak, key=lambda s: (*_rank(s, needs, widths=False), -s.rank))
-        host = _host(sheet, strip, strips)
+        host = _host(sheet, strip, strips, patio)
         if host is None or not _absorb(sheet, host, strip):
             barred.add(id(strip))
             continue
@@ -249,30 +296,31 @@ def _shallow(sheet: Sheet, strip: Strip, needs: Needs) -> bool:
 
 def _unfit(sheet: Sheet, strip: Strip, needs: Needs) -> bool:
     return (
-        strip.street.rim
-        or len(strip.front) < 2
+        len(strip.front) < 2
         or sheet.length(strip.front) < needs.front
         or sheet.area(strip.ring) < needs.area
     )
 
 
-def _host(sheet: Sheet, strip: Strip, strips: Sequence[Strip]) -> Strip | None:
-    """Return the strip that shares the longest border; one on a street before one on a rim."""
+def _host(
+    sheet: Sheet,
+    strip: Strip,
+    strips: Sequence[Strip],
+    patio: Set[tuple[int, int]] = frozenset(),
+) -> Strip | None:
+    """Return the strip that shares the longest border; None if that is the one with a patio."""
     ring = strip.ring
     edges = set(zip(ring[1:] + ring[:1], ring, strict=True))
-    best: tuple[tuple[bool, float, int], Strip] | None = None
+    longest = (sum(sheet.distance(u, v) for u, v in edges & patio), 0)
+    host = None
     for other in strips:
         if other is strip:
             continue
-        border = sum(
-            sheet.distance(u, v)
-            for u, v in zip(other.back, other.back[1:], strict=False)
-            if (u, v) in edges
-        )
-        key = (not other.street.rim, round(border, 6), -other.rank)
-        if border > 0.0 and (best is None or key > best[0]):
-            best = (key, other)
-    return None if best is None else best[1]
+        border = sum(sheet.distance(u, v) for u, v in pairwise(other.back) if (u, v) in edges)
+        key = (round(border, 6), -other.rank)
+        if border > 0.0 and key > longest:
+            longest, host = key, other
+    return host
 
 
 def _absorb(sheet: Sheet, host: Strip, strip: Strip) -> bool:
@@ -281,7 +329,7 @@ def _absorb(sheet: Sheet, host: Strip, strip: Strip) -> bool:
     place = {edge: k for k, edge in enumerate(zip(ring[1:] + ring[:1], ring, strict=True))}
     runs: list[tuple[float, int, int]] = []
     start = -1
-    for k, (u, v) in enumerate(zip(host.back, host.back[1:], strict=False)):
+    for k, (u, v) in enumerate(pairwise(host.back)):
         at = place.get((u, v))
         if at is None:
             start = -1
@@ -307,7 +355,5 @@ def _trim(sheet: Sheet, strip: Strip, at: int) -> None:
     while 0 < at < len(strip.back) - 1 and strip.back[at - 1] == strip.back[at + 1]:
         strip.splice(sheet, at - 1, at + 1, [])
         del strip.back[at]
-        strip.guides = {
-            v: (p - 1 if p >= at else p, x, y) for v, (p, x, y) in strip.guides.items()
-        }
+        strip.guides = {v: (p - 1 if p >= at else p, x, y) for v, (p, x, y) in strip.guides.items()}
         at -= 1

@@ -47,6 +47,14 @@ class _Plane:
     segments: Segments
 
 
+@dataclass(frozen=True, eq=False)
+class _Tree:
+    """All faces there were, level by level, and for each level those that stayed whole."""
+
+    levels: list[_Level]
+    leaves: list[BoolArray]
+
+
 def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     """Halve faces across their oriented boxes until they are small enough.
 
@@ -88,7 +96,7 @@ def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
         if halved is None:
             break
         levels.append(halved)
-    return _as_pieces(ground, contour, plane, (levels, leaves))
+    return _as_pieces(ground, contour, plane, _Tree(levels, leaves))
 
 
 def _contour_of(ground: Ground) -> Contour:
@@ -181,6 +189,7 @@ def _faces_at(
         boxes=boxes,
         area=area,
         least=rules.min_area[block],
+        largest=rules.max_area[block],
         min_width=min_width,
         snap=rules.snap[block],
         narrowest=narrowest,
@@ -213,57 +222,89 @@ def _added_to_plane(part: Halved, boxes: Boxes, plane: _Plane) -> tuple[Rings, _
     )
 
 
-def _as_pieces(
-    ground: Ground,
-    contour: Contour,
-    plane: _Plane,
-    grown: tuple[list[_Level], list[BoolArray]],
-) -> Pieces:
-    """Collect the faces that stayed whole, in the order of cuts, and node them."""
-    levels, leaves = grown
-    position = np.concatenate(_positions(levels, leaves))
-    order = np.argsort(position)
-    rings = join_rings(
-        [level.rings.take(np.flatnonzero(leaf)) for level, leaf in zip(levels, leaves, strict=True)]
-    ).take(order)
-    block, lineage, depth = (
-        np.concatenate(parts)[order]
-        for parts in (
-            [level.block[leaf] for level, leaf in zip(levels, leaves, strict=True)],
-            [level.lineage[leaf] for level, leaf in zip(levels, leaves, strict=True)],
-            [np.full(np.count_nonzero(leaf), n) for n, leaf in enumerate(leaves)],
-        )
-    )
+def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: _Tree) -> Pieces:
+    """Collect the faces that stayed whole, in the order of cuts, and node them.
+
+    Where a face is valid no more with the vertices of its neighbours, as may be where it is
+    narrower than coordinates are precise, the one it comes from stays whole instead.
+    """
     n_ground = len(ground.rings.xy)
-    noded, _ = node_rings(rings, plane.xy, plane.segments, n_fixed=n_ground)
+    while True:
+        depth, face = _leaves_in_order(tree)
+        rings = _collected(tree, depth, face)
+        noded, _ = node_rings(rings, plane.xy, plane.segments, n_fixed=n_ground)
+        broken = _broken(noded, plane.xy) & (depth > 0)
+        if not broken.any():
+            break
+        tree = _taken_back(tree, depth[broken], face[broken])
     noded = _from_lowest(noded, plane.xy)
     xy, vertex = _used_vertices(plane.xy, noded.vertex, n_ground)
+    first = starts(np.array([len(level.block) for level in tree.levels]))
+    at = first[depth] + face
     return Pieces(
         xy=xy,
         vertex=vertex,
         offsets=noded.offsets,
         face=noded.face,
         access=contour.access(noded.segment),
-        block=block,
-        lineage=lineage,
+        block=np.concatenate([level.block for level in tree.levels])[at],
+        lineage=np.concatenate([level.lineage for level in tree.levels])[at],
         level=depth,
-        patio=np.zeros(len(block), dtype=bool),
+        patio=np.zeros(len(at), dtype=bool),
     )
 
 
-def _positions(levels: list[_Level], leaves: list[BoolArray]) -> list[IntArray]:
-    """Position of the faces that stayed whole, level by level, if pieces replaced what was cut."""
-    sizes = [leaf.astype(np.int64) for leaf in leaves]
+def _leaves_in_order(tree: _Tree) -> tuple[IntArray, IntArray]:
+    """Level and number of the faces that stayed whole, as if pieces replaced what was cut."""
+    levels = tree.levels
+    sizes = [leaf.astype(np.int64) for leaf in tree.leaves]
     for n in range(len(levels) - 1, 0, -1):
         np.add.at(sizes[n - 1], levels[n].parent, sizes[n])
     first = starts(sizes[0])[:-1]
-    out = [first[leaves[0]]]
+    position = [first[tree.leaves[0]]]
     for n in range(1, len(levels)):
         parent, before = levels[n].parent, starts(sizes[n])[:-1]
         eldest = np.searchsorted(parent, parent)
         first = first[parent] + before - before[eldest]
-        out.append(first[leaves[n]])
-    return out
+        position.append(first[tree.leaves[n]])
+    order = np.argsort(np.concatenate(position))
+    face = [leaf.nonzero()[0] for leaf in tree.leaves]
+    depth = np.repeat(np.arange(len(levels)), [len(part) for part in face])
+    return depth[order], np.concatenate(face)[order]
+
+
+def _collected(tree: _Tree, depth: IntArray, face: IntArray) -> Rings:
+    """Return the rings of faces of different levels."""
+    order = np.argsort(depth, kind="stable")
+    cuts = np.searchsorted(depth[order], np.arange(len(tree.levels) + 1))
+    parts = [
+        level.rings.take(face[order[a:b]])
+        for level, a, b in zip(tree.levels, cuts[:-1], cuts[1:], strict=True)
+    ]
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    return join_rings(parts).take(back)
+
+
+def _broken(noded: Rings, xy: FloatArray) -> BoolArray:
+    return ~noded.are_valid(xy)
+
+
+def _taken_back(tree: _Tree, depth: IntArray, face: IntArray) -> _Tree:
+    """Return the tree in which the faces that given ones come from stayed whole."""
+    leaves = [leaf.copy() for leaf in tree.leaves]
+    within = [np.zeros(len(leaf), dtype=bool) for leaf in leaves]
+    for n in range(1, len(leaves)):
+        parent = tree.levels[n].parent
+        whole = parent[face[depth == n]]
+        leaves[n - 1][whole] = True
+        within[n - 1][whole] = True
+    for n in range(1, len(leaves)):
+        parent = tree.levels[n].parent
+        gone = within[n - 1][parent]
+        leaves[n][gone] = False
+        within[n] |= gone
+    return _Tree(tree.levels, leaves)
 
 
 def _from_lowest(rings: Rings, xy: FloatArray) -> Rings:

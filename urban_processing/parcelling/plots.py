@@ -26,8 +26,8 @@ class Plots:
     ----------
     sheet
         Their vertices.
-    rings
-        Ring of each parcel, counter-clockwise.
+    polygons
+        Rings of each parcel: its shell, counter-clockwise, and holes, if any.
     lineage
         Seed of each.
     access
@@ -37,33 +37,38 @@ class Plots:
     def __init__(
         self,
         sheet: Sheet,
-        rings: Sequence[list[int]],
+        polygons: Sequence[list[list[int]]],
         lineage: Sequence[int],
         access: Sequence[bool],
     ) -> None:
         self.sheet, self.access = sheet, access
         self.rings: dict[int, list[int]] = {}
+        self.holes: dict[int, list[list[int]]] = {}
         self.area: dict[int, float] = {}
         self.lineage: dict[int, int] = {}
         self.level: dict[int, int] = {}
         self.left_of: dict[tuple[int, int], int] = {}
-        for ring, seed in zip(rings, lineage, strict=True):
-            self._put(ring, seed, 1)
+        for (ring, *holes), seed in zip(polygons, lineage, strict=True):
+            self._put(ring, seed, 1, holes)
 
-    def _put(self, ring: list[int], lineage: int, level: int) -> int:
+    def _put(
+        self, ring: list[int], lineage: int, level: int, holes: Sequence[list[int]] = ()
+    ) -> None:
         number = len(self.area)
         self.rings[number] = ring
+        self.holes[number] = list(holes)
         self.lineage[number] = lineage
         self.level[number] = level
-        self.area[number] = self.sheet.area(ring)
-        for edge in edges_of(ring):
-            self.left_of[edge] = number
-        return number
+        self.area[number] = sum(self.sheet.area(part) for part in (ring, *holes))
+        for part in (ring, *holes):
+            for edge in edges_of(part):
+                self.left_of[edge] = number
 
     def _take(self, number: int) -> list[int]:
         ring = self.rings.pop(number)
-        for edge in edges_of(ring):
-            del self.left_of[edge]
+        for part in (ring, *self.holes[number]):
+            for edge in edges_of(part):
+                del self.left_of[edge]
         return ring
 
     def front(self, number: int) -> float:
@@ -98,6 +103,8 @@ class Plots:
             count += 1
         first = a[(start + count) % len(a)]
         rest = [a[(start + count + k) % len(a)] for k in range(len(a) - count + 1)]
+        if rest[-1] not in b or first not in b:
+            return None
         at = b.index(rest[-1])
         ahead = []
         while True:
@@ -114,7 +121,7 @@ class Plots:
         self._take(number)
         self._take(other)
         level = max(self.level[number], self.level[other])
-        self._put(ring, self.lineage[other], level)
+        self._put(ring, self.lineage[other], level, self.holes[number] + self.holes[other])
 
     def divide(self, number: int, p: Place, q: Place) -> None:
         """Divide a parcel by the line between two places of its ring, ``p`` before ``q``."""
@@ -138,7 +145,9 @@ class Plots:
         for a, b in ((u, v), (v, u)):
             owner = self.left_of.pop((a, b), None)
             if owner is not None:
-                self.rings[owner].insert(self.rings[owner].index(a) + 1, vertex)
+                parts = (self.rings[owner], *self.holes[owner])
+                part = next(part for part in parts if (a, b) in edges_of(part))
+                part.insert(part.index(a) + 1, vertex)
                 self.left_of[a, vertex] = self.left_of[vertex, b] = owner
         return vertex
 

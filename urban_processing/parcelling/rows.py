@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -25,14 +23,15 @@ from urban_processing.parcelling.divided import (
 from urban_processing.parcelling.ground import Ground, Pieces, Rules
 from urban_processing.parcelling.lineage import child
 from urban_processing.parcelling.mending import Needs, beta_strips
-from urban_processing.parcelling.plots import Plots
+from urban_processing.parcelling.patios import joined, patio_faces, rows_and_patios
+from urban_processing.parcelling.plots import Plots, edges_of
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.slices import Slicer, rings_of_lots
 from urban_processing.parcelling.spacing import Bounds
 from urban_processing.parcelling.streets import logical_streets, sides_of_rings
 from urban_processing.parcelling.strips import Strip, alpha_strips
 from urban_processing.parcelling.tidy import divide_large, tidy
-from urban_processing.skeleton.straight import Skeleton, cut_at_depth, straight_skeleton
+from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 LEAST_FRONT = 0.75
 """Shortest front of a strip, over the smallest width."""
@@ -88,7 +87,9 @@ def divide_in_rows(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
 def _unsound(ground: Ground, pieces: Pieces) -> IntArray:
     """Polygons whose faces are not valid or do not tile them."""
     polygons = pieces.polygons()
-    valid = np.bincount(pieces.block, weights=~shapely.is_valid(polygons), minlength=len(ground)) == 0
+    valid = (
+        np.bincount(pieces.block, weights=~shapely.is_valid(polygons), minlength=len(ground)) == 0
+    )
     tiled = np.bincount(pieces.block, weights=shapely.area(polygons), minlength=len(ground))
     rings = ground.rings
     area = np.bincount(
@@ -118,7 +119,9 @@ def _divide(polygon: Polygon, rules: Rules, k: int, seed: int) -> Divided:
         skeleton = straight_skeleton(polygon.xy, polygon.offsets)
     except TopologyError:
         return whole(polygon)
-    skeleton, patios = _cut(skeleton, float(rules.offset[k]), area, bounds)
+    skeleton, patios = rows_and_patios(
+        skeleton, offset=float(rules.offset[k]), area=area, min_area=bounds.min_area
+    )
     sheet = Sheet(skeleton.xy, skeleton.height, polygon.following)
     needs = Needs(
         area=bounds.min_area,
@@ -129,39 +132,27 @@ def _divide(polygon: Polygon, rules: Rules, k: int, seed: int) -> Divided:
         reach=bounds.min_width,
         snap=bounds.snap,
     )
-    strips = _strips(sheet, polygon, skeleton, corner=float(rules.corner[k]), needs=needs)
+    strips = _alpha_strips(sheet, polygon, skeleton, corner=float(rules.corner[k]), needs=needs)
+    inside = {edge for patio in patios for ring in patio for edge in edges_of(ring)}
+    strips, left = beta_strips(sheet, strips, needs, inside)
+    if left:
+        patios = joined(sheet, patios, [strip.ring for strip in left])
     plots = _parcels(sheet, polygon, strips, bounds, seed)
     tidy(plots, bounds)
     divide_large(plots, bounds)
     faces = [
-        Face([plots.rings[n]], plots.lineage[n], plots.level[n]) for n in sorted(plots.rings)
+        Face([plots.rings[n], *plots.holes[n]], plots.lineage[n], plots.level[n])
+        for n in sorted(plots.rings)
     ]
-    faces += _patio_faces(sheet, polygon, patios)
+    faces += patio_faces(sheet, patios, child(polygon.lineage, _PATIOS))
     straightened(sheet, faces)
     return Divided(polygon, sheet, faces)
 
 
-def _cut(
-    skeleton: Skeleton, offset: float, area: float, bounds: Bounds
-) -> tuple[Skeleton, list[list[list[int]]]]:
-    """Cut rows off at their depth, where what lies within is large enough for a patio."""
-    if not math.isfinite(offset):
-        return skeleton, []
-    lower, patios = cut_at_depth(skeleton, offset)
-    rings = [[ring.tolist() for ring in patio] for patio in patios]
-    inner = [
-        float(ring_areas(lower.xy[np.concatenate(p)], np.cumsum([0, *map(len, p)])).sum())
-        for p in patios
-    ]
-    if max(inner, default=0.0) < bounds.min_area or area - sum(inner) < bounds.min_area:
-        return skeleton, []
-    return lower, rings
-
-
-def _strips(
+def _alpha_strips(
     sheet: Sheet, polygon: Polygon, skeleton: Skeleton, *, corner: float, needs: Needs
 ) -> list[Strip]:
-    """Return the β-strips, ranked by what does not depend on where rings begin."""
+    """Return the α-strips, ranked by what does not depend on where rings begin."""
     x, y = polygon.xy.mean(axis=0).tolist()
     streets = [
         street
@@ -179,7 +170,7 @@ def _strips(
     )
     for rank, strip in enumerate(strips):
         strip.rank = rank
-    return beta_strips(sheet, strips, needs)
+    return strips
 
 
 def _parcels(
@@ -193,26 +184,11 @@ def _parcels(
         count = int(slicer.length / bounds.min_width) + 2
         draws = uniform(seed, np.array([lineage], dtype=np.uint64), count)[0].tolist()
         parts.append((strip, slicer.lots(slicer.cuts(draws)), lineage))
-    rings, seeds = [], []
+    polygons: list[list[list[int]]] = []
+    seeds: list[int] = []
     for strip, lots, lineage in parts:
-        rings += rings_of_lots(sheet, strip, lots)
-        seeds += [child(lineage, k) for k in range(len(lots))]
-    return Plots(sheet, rings, seeds, polygon.access)
-
-
-def _patio_faces(
-    sheet: Sheet, polygon: Polygon, patios: Sequence[list[list[int]]]
-) -> list[Face]:
-    """Return the patios, the largest first, with all points that were added on their edges."""
-    faces = []
-    for patio in patios:
-        rings = []
-        for ring in patio:
-            noded: list[int] = []
-            for u, v in pairwise([*ring, ring[0]]):
-                noded += [u, *sheet.within(u, v)]
-            rings.append(noded)
-        faces.append((sum(sheet.area(ring) for ring in rings), rings))
-    faces.sort(key=lambda f: (-round(f[0], 4), min((sheet.y[v], sheet.x[v]) for v in f[1][0])))
-    parent = child(polygon.lineage, _PATIOS)
-    return [Face(rings, child(parent, k), 1, patio=True) for k, (_, rings) in enumerate(faces)]
+        for k, shapes in enumerate(rings_of_lots(sheet, strip, lots)):
+            polygons += shapes
+            own = child(lineage, k)
+            seeds += [own] + [child(own, j) for j in range(1, len(shapes))]
+    return Plots(sheet, polygons, seeds, polygon.access)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.parcelling.ground import FINE_GRID
@@ -117,6 +118,34 @@ class Sheet:
             found += [a, *self.within(a, b)]
         return found
 
+    def contains(self, shell: Sequence[int], ring: Sequence[int]) -> bool:
+        """Whether a ring lies within another that it does not cross."""
+        x, y = self.x, self.y
+        own = set(shell)
+        spots = [((x[u] + x[v]) / 2, (y[u] + y[v]) / 2) for u, v in pairwise(ring)]
+        spots = [(x[v], y[v]) for v in ring if v not in own] + spots
+        px, py = spots[0]
+        inside = False
+        u = shell[-1]
+        for v in shell:
+            if (y[u] > py) != (y[v] > py) and x[u] + (py - y[u]) * (x[v] - x[u]) / (
+                y[v] - y[u]
+            ) > px:
+                inside = not inside
+            u = v
+        return inside
+
+    def leftmost(self, before: int, u: int, ends: Sequence[int]) -> int:
+        """Return the end towards which the way from ``before`` turns left the most at ``u``."""
+        x, y = self.x, self.y
+        ax, ay = x[u] - x[before], y[u] - y[before]
+
+        def turn(v: int) -> float:
+            bx, by = x[v] - x[u], y[v] - y[u]
+            return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+
+        return max(ends, key=turn)
+
     def area(self, ring: Sequence[int]) -> float:
         """Signed area of a ring."""
         x, y = self.x, self.y
@@ -131,8 +160,7 @@ class Sheet:
 
     def length(self, chain: Iterable[int]) -> float:
         """Length of a chain of vertices."""
-        chain = list(chain)
-        return sum(self.distance(u, v) for u, v in zip(chain, chain[1:], strict=False))
+        return sum(self.distance(u, v) for u, v in pairwise(chain))
 
 
 def to_grid(value: float) -> float:

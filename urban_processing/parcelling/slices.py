@@ -10,6 +10,7 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from urban_processing.parcelling.bays import Bay, Hit, bays_of
+from urban_processing.parcelling.mending import sees
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
 from urban_processing.parcelling.strips import Strip
@@ -20,6 +21,7 @@ STEP = 0.5
 TRIES = ((1.0, True, 1.01), (1.0, False, 1.01), (0.0, False, 1.05))
 """Shares of ω, whether lines are moved to vertices, and margins over the smallest area, in the
 order in which they are tried. Areas of a profile are a little off, hence the margins."""
+
 
 class Cut(NamedTuple):
     """A line from a point of the front, at length ``s`` along it, to a point of the back.
@@ -57,6 +59,7 @@ class Slicer:
     def __init__(self, sheet: Sheet, strip: Strip, bounds: Bounds) -> None:
         self.sheet, self.strip, self.bounds = sheet, strip, bounds
         self.bays = bays_of(sheet, strip)
+        self.ring = strip.ring
         self.starts = [bay.start for bay in self.bays]
         front, back = strip.front, strip.back
         self.s = [0.0, *accumulate(sheet.distance(u, v) for u, v in pairwise(front))]
@@ -128,7 +131,9 @@ class Slicer:
         profile = self.profile()
         for count in range(profile.number(), 1, -1):
             for irregularity, snap, margin in TRIES:
-                shares = shares_of(draws[:count], irregularity * self.bounds.irregularity, self.bounds)
+                shares = shares_of(
+                    draws[:count], irregularity * self.bounds.irregularity, self.bounds
+                )
                 hits: dict[float, Hit] = {}
                 ends = profile.ends(
                     shares, partial(self._moved, hits) if snap else _unmoved, margin=margin
@@ -137,7 +142,7 @@ class Slicer:
                     continue
                 cuts = [self.cut(s, hits.get(s) or self._cast(s)) for s in ends]
                 if self._within_bounds(cuts):
-                    return cuts
+                    return [cut for cut in cuts if self._clear(cut)]
         return []
 
     def _moved(self, hits: dict[float, Hit], s: float) -> float:
@@ -149,8 +154,11 @@ class Slicer:
     def _snapped(self, s: float) -> tuple[float, Hit]:
         snap = self.bounds.snap
         k = bisect.bisect(self.s, s)
-        near = min((self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1), default=math.inf,
-                   key=lambda at: abs(at - s))
+        near = min(
+            (self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1),
+            default=math.inf,
+            key=lambda at: abs(at - s),
+        )
         if abs(near - s) <= snap:
             return near, self._cast(near)
         bay = self.bay_at(s)
@@ -163,11 +171,15 @@ class Slicer:
             x, y = sheet.x[vertex], sheet.y[vertex]
             if abs(x - hit.x) + abs(y - hit.y) > 2.0 * snap:
                 continue
-            origin = bay.origin((x - bay.x) * bay.dx + (y - bay.y) * bay.dy)
+            t = (x - bay.x) * bay.dx + (y - bay.y) * bay.dy
+            origin = bay.origin(t)
             if origin is None:
                 continue
             gap = abs(origin + bay.start - s)
-            if gap <= snap and (best is None or gap < best[0]):
+            if gap > snap or (best is not None and gap >= best[0]):
+                continue
+            seen = bay.reach(t)
+            if abs(seen.x - x) + abs(seen.y - y) < 1e-3:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
         return (s, hit) if best is None else best[1:]
 
@@ -177,6 +189,15 @@ class Slicer:
         return all(high - low >= self.bounds.min_area for low, high in pairwise(areas)) and all(
             later.hit.at <= before.hit.at + 1e-9 for before, later in pairwise(cuts)
         )
+
+    def _clear(self, cut: Cut) -> bool:
+        """Whether a line runs within the strip; one that is not moved does."""
+        bay = self.bay_at(cut.s)
+        px, py = bay.x + (cut.s - bay.start) * bay.dx, bay.y + (cut.s - bay.start) * bay.dy
+        ex, ey = cut.hit.x - px, cut.hit.y - py
+        if abs(ex * bay.dx + ey * bay.dy) < 1e-3 * math.hypot(ex, ey):
+            return True
+        return sees(self.sheet, self.ring, (px, py), (cut.hit.x, cut.hit.y))
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:
         """Add the ends of the lines to the sheet; return the parts of the strip between them."""
@@ -206,8 +227,12 @@ class Slicer:
         return lots
 
 
-def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[int]]:
-    """Rings of the parts of a strip, with all points that were added on its back."""
+def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[list[list[int]]]]:
+    """Polygons of each part of a strip, with all points that were added on its back.
+
+    A part is more than one polygon where it touches itself at a vertex. Each has its shell first,
+    then holes: what a part surrounds alone.
+    """
     back = strip.back
     spots: list[tuple[int, int]] = []
     for k, (u, v) in enumerate(pairwise(back)):
@@ -215,33 +240,40 @@ def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[int]
         spots += [(k, point) for _, point in sheet.between(u, v)]
     spots.append((len(back) - 1, back[-1]))
     place = {spot: k for k, spot in enumerate(spots)}
-    rings = []
-    for lot in lots:
-        ring = list(lot.front)
-        for _, vertex in spots[place[lot.begin] : place[lot.end] + 1]:
-            if vertex != ring[-1]:
-                ring.append(vertex)
-        rings.append(_without_spurs(ring))
-    return rings
+    rings = (
+        lot.front + [v for _, v in spots[place[lot.begin] : place[lot.end] + 1]] for lot in lots
+    )
+    return [_polygons(sheet, _loops(ring)) for ring in rings]
 
 
-def _without_spurs(ring: list[int]) -> list[int]:
-    """Leave out arcs that have the same lot on both sides."""
-    kept: list[int] = []
-    for v in ring:
-        if kept and kept[-1] == v:
-            continue
-        if len(kept) > 1 and kept[-2] == v:
-            kept.pop()
-        else:
-            kept.append(v)
-    while len(kept) > 2 and kept[0] == kept[-1]:
-        kept.pop()
-        if kept[-1] == kept[1]:
-            del kept[0]
-    while len(kept) > 2 and kept[-2] == kept[0]:
-        kept = kept[:-2]
-    return kept
+def _polygons(sheet: Sheet, loops: list[list[int]]) -> list[list[list[int]]]:
+    if len(loops) == 1:
+        return [loops]
+    polygons = [[loop] for loop in loops if sheet.area(loop) > 0.0]
+    for loop in loops:
+        if sheet.area(loop) < 0.0:
+            around = [p for p in polygons if sheet.contains(p[0], loop)]
+            min(around or polygons, key=lambda p: sheet.area(p[0])).append(loop)
+    return polygons
+
+
+def _loops(ring: list[int]) -> list[list[int]]:
+    """Take a ring apart where it touches itself; arcs walked to and fro fall away."""
+    loops = []
+    chain: list[int] = []
+    at: dict[int, int] = {}
+    for v in [*ring, ring[0]]:
+        if v in at:
+            start = at[v]
+            loop = chain[start:]
+            del chain[start:]
+            for u in loop:
+                del at[u]
+            if len(loop) > 2:
+                loops.append(loop)
+        at[v] = len(chain)
+        chain.append(v)
+    return loops
 
 
 def _unmoved(s: float) -> float:

@@ -63,7 +63,9 @@ class Profile:
         for (s, t), (low, high) in zip(pairwise(spots), pairwise(areas), strict=True):
             length, area = t - s, high - low
             thin = length < END * self.length
-            number = area / self._area_aimed_at(depth) if thin else length / self._width(area / length)
+            number = (
+                area / self._area_aimed_at(depth) if thin else length / self._width(area / length)
+            )
             self.numbers.append(self.numbers[-1] + number)
 
     def _width(self, depth: float) -> float:

@@ -92,9 +92,16 @@ def sides_of_rings(sheet: Sheet, polygon: Polygon, edge_face: Sequence[int]) -> 
     """Return the sides of each ring of a polygon, given the face of the skeleton on each edge."""
     rings = []
     for low, high in pairwise(polygon.offsets.tolist()):
-        starts = [k for k in range(low, high) if edge_face[k] != edge_face[k - 1 if k > low else high - 1]]
+        starts = [
+            k for k in range(low, high) if edge_face[k] != edge_face[k - 1 if k > low else high - 1]
+        ]
         stops = starts[1:] + starts[:1]
-        rings.append([_side(sheet, polygon, edge_face[k], k, stop) for k, stop in zip(starts, stops, strict=True)])
+        rings.append(
+            [
+                _side(sheet, polygon, edge_face[k], k, stop)
+                for k, stop in zip(starts, stops, strict=True)
+            ]
+        )
     return rings
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.streets import Street
@@ -74,9 +75,7 @@ class Strip:
         if best is None:
             near = min(
                 range(section.start, section.stop + 1),
-                key=lambda k: math.hypot(
-                    sheet.x[self.back[k]] - gx, sheet.y[self.back[k]] - gy
-                ),
+                key=lambda k: math.hypot(sheet.x[self.back[k]] - gx, sheet.y[self.back[k]] - gy),
             )
             return (float(near), sheet.x[self.back[near]], sheet.y[self.back[near]])
         return (best[1], gx + best[0] * dx, gy + best[0] * dy)
@@ -166,7 +165,7 @@ def _strip(
     rim = {edge for edge in own if edge not in glued}
     while True:
         walk, passed = _walk(mesh, glued, street.front[:2])
-        left = rim - set(zip(walk, walk[1:], strict=False))
+        left = rim - set(pairwise(walk))
         way = _way(sheet, mesh, glued & own, left, set(walk[len(street.front) - 1 :]))
         if not way:
             break
@@ -174,7 +173,7 @@ def _strip(
         rim |= way
     n = len(street.front)
     strip = Strip(street.front, walk[n - 1 :], {}, street)
-    for before, side in zip(street.sides, street.sides[1:], strict=False):
+    for before, side in pairwise(street.sides):
         vertex = side.run[0]
         end = _guide_end(sheet, mesh, passed, vertex)
         x, y = before.dx + side.dx, before.dy + side.dy

@@ -36,8 +36,7 @@ def tidy(plots: Plots, bounds: Bounds) -> None:
 
 def _faulty(plots: Plots, number: int, bounds: Bounds) -> bool:
     return (
-        plots.area[number] < bounds.min_area
-        or plots.front(number) < LEAST_FRONT * bounds.min_width
+        plots.area[number] < bounds.min_area or plots.front(number) < LEAST_FRONT * bounds.min_width
     )
 
 
@@ -74,6 +73,8 @@ def divide_large(plots: Plots, bounds: Bounds) -> None:
 def _halving(plots: Plots, number: int, bounds: Bounds) -> tuple[Place, Place] | None:
     """Return the line from a front that divides a parcel into the most equal halves."""
     sheet, ring = plots.sheet, plots.rings[number]
+    if plots.holes[number]:
+        return None
     best: tuple[float, Place, Place] | None = None
     for front in plots.fronts(number):
         length = sum(sheet.distance(ring[k], ring[(k + 1) % len(ring)]) for k in front)

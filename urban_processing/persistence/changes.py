@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ import shapely
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.persistence.block_match import NONE
+from urban_processing.persistence.layers import Change
 
 ObjectArray = npt.NDArray[np.object_]
 
@@ -20,23 +20,6 @@ SAME = 1e-3
 MOST = 0.5 + 1e-6
 """A parcel comes out of another, or went into it, with more than this share of its area: more than
 half, by so much that rounding decides nothing where a parcel is cut in equal halves."""
-
-
-class Change(enum.StrEnum):
-    """What became of a parcel."""
-
-    KEPT = "kept"
-    """Its number goes on; shape and place are the same."""
-    MOVED = "moved"
-    """Its number goes on; shape or place are others."""
-    SPLIT = "split"
-    """A new parcel, more than half of which was one old parcel."""
-    MERGED = "merged"
-    """An old parcel whose number ends, more than half of which is in one new parcel."""
-    GONE = "gone"
-    """Any other old parcel whose number ends."""
-    NEW = "new"
-    """Any other new parcel."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,8 @@ them: what rounding to the grid of all coordinates moves a point by."""
 EXACTLY_STRAIGHT = 1e-12
 """Sine of the bend of two edges that are one even among many."""
 
+NO_RING = "A ring of a block has fewer than three corners: repair the block or leave it out."
+
 
 @dataclass(frozen=True, eq=False)
 class Contour:
@@ -76,6 +78,8 @@ def contour_of(xy: FloatArray, offsets: IntArray, straight: float) -> Contour:
     TopologyError
         A ring is less than a triangle, or two of its vertices in a row are the same.
     """
+    if len(xy) < 3:
+        raise TopologyError(NO_RING)
     low, high = xy.min(axis=0), xy.max(axis=0)
     # the middle in whole metres, so that nothing is lost to the shift
     origin = np.floor((low + high) / 2)
@@ -138,9 +142,7 @@ def _runs(points: list[tuple[float, float]], ring: list[int], straight: float) -
             cut += [k % n for k in range(a + 1, b) if not exact[k % n]]
     cut = sorted(cut) if corners else [k for k in range(n) if not exact[k]]
     if len(cut) < 3:
-        raise TopologyError(
-            "A ring of a block has fewer than three corners: repair the block or leave it out."
-        )
+        raise TopologyError(NO_RING)
     ends = [*cut[1:], cut[0] + n]
     return [[ring[k % n] for k in range(a, b + 1)] for a, b in zip(cut, ends, strict=True)]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 import shapely
@@ -10,12 +12,60 @@ from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.skeleton.contour import Contour
 from urban_processing.skeleton.wavefront import Arcs, Unresolved
 
-SHORT = 2.0**-18
-"""Length in metres of arcs between inner nodes that are contracted: on contours whose vertices
-are rounded to the grid of all coordinates, events that are meant to be one lie so far apart."""
+SAME_PLACE = 2.0**-18
+"""Distance in metres by which the lines of the faces of two nodes may miss one place that stands
+for both. On contours whose vertices are rounded to the grid of all coordinates, events that are
+meant to be one are parted by so much."""
+
+SHORT = 2.0**-7
+"""Length in metres of arcs whose ends may be one place: lines cross at low angles."""
 
 HEIGHT_TOLERANCE = 2.0**-15
-"""Distance in metres by which a node may miss its height over an edge: some contracted arcs."""
+"""Distance in metres by which a node may miss its height over an edge."""
+
+FLAT = 1e-10
+"""Determinant of normal equations below which lines do not tell where they meet."""
+
+
+def contracted(contour: Contour, arcs: Arcs) -> list[int]:
+    """Return the node that stands for each one where nodes that are meant to be one are joined.
+
+    Parameters
+    ----------
+    contour
+        The merged edges.
+    arcs
+        What the wavefront traced.
+    """
+    m = len(contour)
+    group = list(range(len(arcs.x)))
+    length = [
+        math.hypot(arcs.x[a] - arcs.x[b], arcs.y[a] - arcs.y[b])
+        for a, b in zip(arcs.start, arcs.end, strict=True)
+    ]
+    short = [k for k, s in enumerate(length) if s < SHORT and arcs.start[k] >= m]
+    if not short:
+        return group
+    edges = _edges_of_nodes(arcs, group)
+
+    def find(node: int) -> int:
+        while group[node] != node:
+            node = group[node]
+        return node
+
+    for k in sorted(short, key=lambda k: length[k]):
+        a, b = sorted((find(arcs.start[k]), find(arcs.end[k])))
+        if a == b:
+            continue
+        both = edges[a] | edges[b]
+        x, y, t = _balanced(contour, sorted(both), (arcs.x[a], arcs.y[a], arcs.t[a]))
+        if all(
+            abs(contour.dx[e] * y - contour.dy[e] * x - contour.c[e] - t) <= SAME_PLACE
+            for e in both
+        ):
+            group[b] = a
+            edges[a] = both
+    return [find(node) for node in range(len(group))]
 
 
 def refined(contour: Contour, arcs: Arcs, group: list[int]) -> Arcs:
@@ -30,17 +80,22 @@ def refined(contour: Contour, arcs: Arcs, group: list[int]) -> Arcs:
     group
         (V,) for each node the one that stands for it.
     """
-    edges: dict[int, set[int]] = {}
-    for ends in (arcs.start, arcs.end):
-        for node, left, right in zip(ends, arcs.left, arcs.right, strict=True):
-            edges.setdefault(group[node], set()).update((left, right))
     m = len(contour)
     x, y, t = list(arcs.x), list(arcs.y), list(arcs.t)
-    for node, around in edges.items():
+    for node, around in _edges_of_nodes(arcs, group).items():
         if node >= m:
             place = _balanced(contour, sorted(around), (x[node], y[node], t[node]))
             x[node], y[node], t[node] = place
     return Arcs(x, y, t, arcs.start, arcs.end, arcs.left, arcs.right)
+
+
+def _edges_of_nodes(arcs: Arcs, group: list[int]) -> dict[int, set[int]]:
+    """Return the merged edges whose faces meet at each node."""
+    edges: dict[int, set[int]] = {}
+    for ends in (arcs.start, arcs.end):
+        for node, left, right in zip(ends, arcs.left, arcs.right, strict=True):
+            edges.setdefault(group[node], set()).update((left, right))
+    return edges
 
 
 def _balanced(
@@ -64,7 +119,7 @@ def _balanced(
     # cofactors of the symmetric 3 x 3 matrix
     a, b, c = yy * tt - yt * yt, xt * yt - xy * tt, xy * yt - yy * xt
     det = xx * a + xy * b + xt * c
-    if det < 1e-6:
+    if det < FLAT:
         return place
     d, e2, f = xx * tt - xt * xt, xy * xt - xx * yt, xx * yy - xy * xy
     return (
@@ -72,25 +127,6 @@ def _balanced(
         y + (b * rx + d * ry + e2 * rt) / det,
         t + (c * rx + e2 * ry + f * rt) / det,
     )
-
-
-def groups(arcs: Arcs, corners: int, short: float) -> list[int]:
-    """Return the node that stands for each one where short arcs are contracted."""
-    group = list(range(len(arcs.x)))
-
-    def find(node: int) -> int:
-        while group[node] != node:
-            node = group[node]
-        return node
-
-    for start, end in zip(arcs.start, arcs.end, strict=True):
-        if start >= corners and (
-            abs(arcs.x[start] - arcs.x[end]) + abs(arcs.y[start] - arcs.y[end]) < short
-        ):
-            a, b = find(start), find(end)
-            if a != b:
-                group[max(a, b)] = min(a, b)
-    return [find(node) for node in range(len(group))]
 
 
 def rings_of_faces(contour: Contour, arcs: Arcs, group: list[int]) -> list[list[int]]:

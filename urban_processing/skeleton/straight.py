@@ -13,7 +13,7 @@ from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import FINE_GRID
 from urban_processing.skeleton.contour import STRAIGHT, Contour, contour_of
 from urban_processing.skeleton.cutting import cut_at_depth
-from urban_processing.skeleton.faces import SHORT, check_faces, groups, refined, rings_of_faces
+from urban_processing.skeleton.faces import check_faces, contracted, refined, rings_of_faces
 from urban_processing.skeleton.model import Skeleton
 from urban_processing.skeleton.wavefront import Arcs, Unresolved, propagate
 
@@ -61,9 +61,9 @@ def straight_skeleton(xy: FloatArray, offsets: IntArray) -> Skeleton:
                 arcs = propagate(contour, tolerance * contour.size)
             except Unresolved:
                 continue
-            for short in (SHORT, 0.0):
+            for group in (contracted(contour, arcs), list(range(len(arcs.x)))):
                 try:
-                    return _assembled(xy, contour, arcs, short)
+                    return _assembled(xy, contour, arcs, group)
                 except Unresolved:
                     continue
     raise TopologyError(
@@ -72,10 +72,9 @@ def straight_skeleton(xy: FloatArray, offsets: IntArray) -> Skeleton:
     )
 
 
-def _assembled(xy: FloatArray, contour: Contour, arcs: Arcs, short: float) -> Skeleton:
-    """Return the skeleton that arcs make where arcs below a length are contracted."""
+def _assembled(xy: FloatArray, contour: Contour, arcs: Arcs, group: list[int]) -> Skeleton:
+    """Return the skeleton that arcs make where some nodes stand for others."""
     m, n = len(contour), len(xy)
-    group = groups(arcs, m, short)
     arcs = refined(contour, arcs, group)
     rings = rings_of_faces(contour, arcs, group)
     used = sorted({node for ring in rings for node in ring[2:] if node >= m})
