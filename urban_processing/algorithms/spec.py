@@ -69,12 +69,12 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
-        return self in (
-            InputKind.BOUNDARY,
-            InputKind.CENTRELINES,
-            InputKind.BLOCK_LAYER,
-            InputKind.PARCELS_BEFORE,
-        )
+        return self.asks_for_crs or self is InputKind.PARCELS_BEFORE
+
+    @property
+    def asks_for_crs(self) -> bool:
+        """Whether the CRS to work in may be chosen with such an input."""
+        return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
 
 
 _OF_SITE = {
