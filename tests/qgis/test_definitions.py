@@ -60,7 +60,7 @@ def test_texts_are_those_of_the_declaration(algorithm: Any, spec: AlgorithmSpec)
     for source in spec.references:
         assert source in algorithm.shortHelpString()
     assert not algorithm.icon().isNull()
-    assert "parcels" in algorithm.tags()
+    assert {spec.name, "planning"} <= set(algorithm.tags())
 
 
 def test_names_are_those_of_the_command_line(algorithm: Any, spec: AlgorithmSpec) -> None:

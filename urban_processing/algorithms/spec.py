@@ -69,11 +69,11 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
-        return self.asks_for_crs or self is InputKind.PARCELS_BEFORE
+        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
 
     @property
-    def asks_for_crs(self) -> bool:
-        """Whether the CRS to work in may be chosen with such an input."""
+    def chooses_crs(self) -> bool:
+        """Whether the user may choose the CRS in which such an input is worked on."""
         return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
 
 

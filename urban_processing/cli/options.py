@@ -111,10 +111,6 @@ _BY_OPTION = (
 """Inputs that are options; the others are arguments."""
 
 
-_WITHOUT_CHOICE = (InputKind.LAYOUT, InputKind.PARCELS_BEFORE, InputKind.PARCELS_AFTER)
-"""Arguments that say themselves which layer of a file is meant."""
-
-
 def _input_parameters(item: Input) -> list[click.Parameter]:
     if item.kind.of_site or item.kind in _BY_OPTION:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
@@ -125,7 +121,7 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
-    if item.kind in _WITHOUT_CHOICE:
+    if not item.kind.chooses_crs:
         return [argument]
     if item.kind is not InputKind.BOUNDARY:
         return [argument, *_choice_of_features()]
