@@ -113,6 +113,9 @@ def _numbers(before: Edition, name: str) -> tuple[IntArray, list[Issue]]:
 
 
 def _is_whole(value: Any) -> bool:
+    """Whether a value is a whole number; text of digits alone is one too."""
+    if isinstance(value, str):
+        return value.strip().isdecimal()
     if isinstance(value, bool) or not isinstance(value, int | float | np.number):
         return False
     return bool(np.isfinite(value)) and float(value) == int(value)
