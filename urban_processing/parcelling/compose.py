@@ -1,0 +1,197 @@
+"""Put pieces together: faces divided further, and blocks divided apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from urban_processing.blocks.model import UNKNOWN_STREET, BlockRings
+from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.parcelling.ground import Ground, Pieces, Rules
+from urban_processing.parcelling.noding import Segments, node_rings
+from urban_processing.parcelling.rings import Rings, starts
+
+
+def part_of_ground(ground: Ground, polygons: IntArray) -> Ground:
+    """Return some of the polygons of a ground, in the order given."""
+    rings = _rings_of_ground(ground)
+    part = rings.take(polygons)
+    return Ground(
+        rings=BlockRings(ground.rings.xy[part.vertex], part.offsets, part.face),
+        access=ground.access[part.vertex],
+        width=ground.width[part.vertex],
+        street=ground.street[part.vertex],
+        lineage=ground.lineage[polygons],
+    )
+
+
+def part_of_rules(rules: Rules, polygons: IntArray) -> Rules:
+    """Return what holds for some of the polygons."""
+    return Rules(**{name: getattr(rules, name)[polygons] for name in Rules.__dataclass_fields__})
+
+
+def ground_of_faces(
+    pieces: Pieces,
+    faces: IntArray,
+    *,
+    width: FloatArray | None = None,
+    street: IntArray | None = None,
+) -> Ground:
+    """Return faces as ground to be divided further.
+
+    Parameters
+    ----------
+    pieces, faces
+        The faces, by number.
+    width, street
+        Width and number of the street along each edge of the pieces, as long as
+        `Pieces.vertex`; by default none is known.
+    """
+    at = _rings_of_pieces(pieces).take(faces)
+    n = len(pieces.vertex)
+    width = np.full(n, np.nan) if width is None else width
+    street = np.full(n, UNKNOWN_STREET) if street is None else street
+    node = at.segment
+    return Ground(
+        rings=BlockRings(pieces.xy[at.vertex], at.offsets, at.face),
+        access=pieces.access[node],
+        width=width[node],
+        street=street[node],
+        lineage=pieces.lineage[faces],
+    )
+
+
+def replace_faces(pieces: Pieces, faces: IntArray, sub: Pieces) -> Pieces:
+    """Put what faces were divided into in their places.
+
+    Neighbours, divided or not, get the vertices that were added on their outlines; such as lie at
+    the same place but for rounding become one.
+
+    Parameters
+    ----------
+    pieces
+        Noded pieces.
+    faces
+        Faces of them that were divided, each once.
+    sub
+        Pieces of the ground of these faces (`ground_of_faces`), in the same order.
+    """
+    rings = _rings_of_pieces(pieces)
+    n_old, n_ground = len(pieces.xy), int(np.diff(rings.face_nodes)[faces].sum())
+    at = rings.take(faces)
+    xy = np.concatenate([pieces.xy, sub.xy[n_ground:]])
+    number = np.append(at.vertex, n_old + np.arange(len(sub.xy) - n_ground))
+    outline = _outline_edges(sub, at)
+    kept = np.setdiff1d(np.arange(pieces.n_faces), faces)
+    left = rings.take(kept)
+    head = sub.vertex[_rings_of_pieces(sub).following]
+    pair, segment = _pairs(
+        np.concatenate([rings.vertex, number[sub.vertex]]),
+        np.concatenate([rings.vertex[rings.following], number[head]]),
+    )
+    n_nodes = len(rings.vertex)
+    along = segment[n_nodes:].copy()
+    on_outline = outline >= 0
+    along[on_outline] = segment[at.segment[outline[on_outline]]]
+    together = Rings(
+        vertex=np.concatenate([left.vertex, number[sub.vertex]]),
+        segment=np.concatenate([segment[left.segment], along]),
+        offsets=starts(np.concatenate([left.size, np.diff(sub.offsets)])),
+        face=np.concatenate([left.face, len(kept) + sub.face]),
+    )
+    origin = np.concatenate([kept, faces[sub.block]])
+    order = np.argsort(origin, kind="stable")
+    access = np.concatenate([pieces.access[left.segment], sub.access])
+    edges = Rings(together.vertex, np.arange(len(access)), together.offsets, together.face)
+    edge = edges.take(order).segment
+    noded, source = node_rings(together.take(order), xy, _segments(pair, xy), n_fixed=n_old)
+    return Pieces(
+        xy=xy,
+        vertex=noded.vertex,
+        offsets=noded.offsets,
+        face=noded.face,
+        access=access[edge[source]],
+        block=pieces.block[origin[order]],
+        lineage=np.concatenate([pieces.lineage[kept], sub.lineage])[order],
+        level=np.append(pieces.level[kept], pieces.level[faces[sub.block]] + sub.level)[order],
+        patio=np.append(pieces.patio[kept], sub.patio)[order],
+    )
+
+
+def join_pieces(parts: Sequence[Pieces], n_ground: Sequence[int]) -> Pieces:
+    """Put the pieces of several grounds together; blocks are numbered on.
+
+    Parameters
+    ----------
+    parts
+        Pieces of each ground.
+    n_ground
+        Number of vertices of each ground.
+    """
+    total = sum(n_ground)
+    first = starts(np.array(n_ground))
+    added = total + starts(np.array([len(p.xy) - n for p, n in zip(parts, n_ground, strict=True)]))
+    n_faces = starts(np.array([part.n_faces for part in parts]))
+    n_blocks = starts(np.array([part.block[-1] + 1 for part in parts]))
+    vertex = []
+    for k, (part, n) in enumerate(zip(parts, n_ground, strict=True)):
+        vertex.append(part.vertex + np.where(part.vertex < n, first[k], added[k] - n))
+    sizes = [np.diff(part.offsets) for part in parts]
+    return Pieces(
+        xy=np.concatenate(
+            [part.xy[:n] for part, n in zip(parts, n_ground, strict=True)]
+            + [part.xy[n:] for part, n in zip(parts, n_ground, strict=True)]
+        ),
+        vertex=np.concatenate(vertex),
+        offsets=starts(np.concatenate(sizes)),
+        face=np.concatenate([part.face + n_faces[k] for k, part in enumerate(parts)]),
+        access=np.concatenate([part.access for part in parts]),
+        block=np.concatenate([part.block + n_blocks[k] for k, part in enumerate(parts)]),
+        lineage=np.concatenate([part.lineage for part in parts]),
+        level=np.concatenate([part.level for part in parts]),
+        patio=np.concatenate([part.patio for part in parts]),
+    )
+
+
+def _rings_of_ground(ground: Ground) -> Rings:
+    edge = np.arange(len(ground.rings.xy))
+    return Rings(edge, edge, ground.rings.offsets, ground.rings.block)
+
+
+def _rings_of_pieces(pieces: Pieces) -> Rings:
+    """Rings whose segments are the numbers of the edges."""
+    return Rings(pieces.vertex, np.arange(len(pieces.vertex)), pieces.offsets, pieces.face)
+
+
+def _outline_edges(sub: Pieces, ground: Rings) -> IntArray:
+    """(N,) edge of the ground that each edge of its pieces is a part of; -1 where of none."""
+    head = sub.vertex[_rings_of_pieces(sub).following]
+    n = len(sub.xy)
+    forth, back = sub.vertex * n + head, head * n + sub.vertex
+    outer = np.flatnonzero(~np.isin(forth, back))
+    at = np.full(n, -1)
+    at[sub.vertex[outer]] = outer
+    out = np.full(len(sub.vertex), -1)
+    edge = np.arange(len(ground.vertex))
+    here = edge  # vertices of the ground come first, and a vertex added lies on one edge alone
+    while len(edge):
+        out[at[here]] = edge
+        here = head[at[here]]
+        going = here != ground.following[edge]
+        edge, here = edge[going], here[going]
+    return out
+
+
+def _pairs(tail: IntArray, head: IntArray) -> tuple[IntArray, IntArray]:
+    """(S, 2) pairs of vertices that edges join, either way, and (N,) the pair of each edge."""
+    n = int(max(tail.max(), head.max())) + 1
+    key, pair = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head), return_inverse=True)
+    return np.column_stack([key // n, key % n]), pair.ravel()
+
+
+def _segments(pair: IntArray, xy: FloatArray) -> Segments:
+    origin = xy[pair[:, 0]]
+    edge = xy[pair[:, 1]] - origin
+    length = np.sqrt((edge**2).sum(axis=1))
+    return Segments(origin, edge / np.where(length > 0, length, 1.0)[:, None], length)

@@ -1,0 +1,329 @@
+"""Blocks to parcels by oriented bounding boxes (Vanegas 2012, section 4.3 and algorithm 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urban_processing.access_rule import MEASURED_M, reached_frontage
+from urban_processing.hashing import splitmix64, uniform
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.parcelling.boxes import Boxes, smallest_boxes
+from urban_processing.parcelling.candidates import Contour, Faces
+from urban_processing.parcelling.ground import Ground, Pieces, Rules, UintArray
+from urban_processing.parcelling.halving import Halved, halve, street_sides
+from urban_processing.parcelling.line_cuts import THE_CUT
+from urban_processing.parcelling.noding import Segments, node_rings
+from urban_processing.parcelling.rings import Rings, join_rings, ranges, starts
+from urban_processing.site import AREA_ROUNDING
+
+STRAIGHT = 1e-3
+"""Sine of the angle below which the contour does not bend at a vertex: no cut snaps to it."""
+
+AT_A_PINCH = 0.5
+"""Share of the smallest width that pieces of a face above the largest area may be down to, where
+none keeps it: a front somewhat narrow is less of an evil than a parcel that is far too large."""
+
+_DRAWS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """Faces made by the same number of cuts, in the order of those they come from."""
+
+    rings: Rings
+    block: IntArray
+    lineage: UintArray
+    parent: IntArray
+    """Face of the level before."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """All vertices so far, and the segments that edges lie on."""
+
+    xy: FloatArray
+    segments: Segments
+
+
+@dataclass(frozen=True, eq=False)
+class _Tree:
+    """All faces there were, level by level, and for each level those that stayed whole."""
+
+    levels: list[_Level]
+    leaves: list[BoolArray]
+
+
+def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
+    """Halve faces across their oriented boxes until they are small enough.
+
+    A face is halved while its area is above `max_area`, its front (`halving.street_sides`) is
+    wider than `max_width`, or it has holes, if each piece keeps `min_area`. The cut goes across
+    the longer side of the smallest box along an edge, through its middle, moved by ω·r
+    times the *shorter* side with r between −½ and ½; so far only that `min_area` is left on both
+    sides, and through a corner of the ground's contour within `snap`. Where a piece would not be
+    reached by street (`access_rule.reached_frontage`), other cuts of the face are tried with
+    probability ξ, first along the other axis, moved by as much; if no cut gives all pieces
+    access, the face stays whole. Faces that are not reached themselves are halved without
+    regard to access. `min_width` holds for the fronts of the pieces, unless the face
+    is above `max_area` and can be halved in no other way. See `halving.halve` for all cuts tried.
+
+    This departs from the paper, whose recursion divides what is outside of both ranges, thus
+    also what is too small, and turns a cut without looking at what the turned one does.
+
+    Parameters
+    ----------
+    ground
+        Polygons to be divided, all at once.
+    rules
+        Bounds, ω, ξ and the snapping distance of each polygon.
+    seed
+        Seed of all random numbers; those of a face come from it and the face's own path.
+
+    Returns
+    -------
+    Pieces
+        Parcels in the order of their polygons; within one in the order of the cuts.
+    """
+    contour = _contour_of(ground)
+    levels = [_first_level(ground)]
+    plane = _Plane(ground.rings.xy, _edge_segments(ground))
+    leaves = []
+    while True:
+        halved, whole, plane = _halve_level(levels[-1], rules, seed, (plane, contour))
+        leaves.append(whole)
+        if halved is None:
+            break
+        levels.append(halved)
+    return _as_pieces(ground, contour, plane, _Tree(levels, leaves))
+
+
+def _contour_of(ground: Ground) -> Contour:
+    """What cuts must know of the ground's vertices and edges."""
+    rings = ground.rings
+    edge = rings.xy[rings.following] - rings.xy
+    previous = np.empty_like(rings.following)
+    previous[rings.following] = np.arange(len(previous))
+    before = edge[previous]
+    sine = before[:, 0] * edge[:, 1] - before[:, 1] * edge[:, 0]
+    length = np.sqrt((edge**2).sum(axis=1))
+    bends = np.abs(sine) > STRAIGHT * length * length[previous]
+    bends |= (before * edge).sum(axis=1) < 0
+    return Contour(np.append(bends, False), np.append(ground.access, False))
+
+
+def _first_level(ground: Ground) -> _Level:
+    n = len(ground.rings.xy)
+    rings = Rings(np.arange(n), np.arange(n), ground.rings.offsets, ground.rings.block)
+    block = np.arange(len(ground))
+    return _Level(rings, block, ground.lineage, block)
+
+
+def _edge_segments(ground: Ground) -> Segments:
+    """Return one segment for each edge of the contour."""
+    rings = ground.rings
+    edge = rings.xy[rings.following] - rings.xy
+    length = np.sqrt((edge**2).sum(axis=1))
+    return Segments(rings.xy, edge / np.where(length > 0, length, 1.0)[:, None], length)
+
+
+def _halve_level(
+    level: _Level, rules: Rules, seed: int, known: tuple[_Plane, Contour]
+) -> tuple[_Level | None, BoolArray, _Plane]:
+    """Return the pieces of all faces that are halved, which are not, and the vertices so far."""
+    plane, contour = known
+    area = level.rings.areas(plane.xy)
+    least = rules.min_area[level.block]
+    rows = np.flatnonzero(area >= 2.0 * least * (1.0 - AREA_ROUNDING))
+    whole = np.ones(len(area), dtype=bool)
+    faces, wanted = _faces_at(level, rows, area[rows], rules, seed, known)
+    rows = rows[wanted]
+    done = halve(faces, plane.xy, contour) if len(rows) else []
+    if not done:
+        return None, whole, plane
+    parts = []
+    for part in done:
+        rings, plane = _added_to_plane(part, faces.boxes, plane)
+        parts.append((rings, rows[part.rows][part.cut.parent]))
+    rings = join_rings([rings for rings, _ in parts])
+    parent = np.concatenate([parent for _, parent in parts])
+    order = np.argsort(parent, kind="stable")
+    parent = parent[order]
+    whole[parent] = False
+    rank = np.arange(len(parent)) - np.searchsorted(parent, parent)
+    lineage = splitmix64(level.lineage[parent] ^ splitmix64((rank + 1).astype(np.uint64)))
+    return _Level(rings.take(order), level.block[parent], lineage, parent), whole, plane
+
+
+def _faces_at(
+    level: _Level,
+    rows: IntArray,
+    area: FloatArray,
+    rules: Rules,
+    seed: int,
+    known: tuple[_Plane, Contour],
+) -> tuple[Faces, IntArray]:
+    """Return faces that are to be halved, and which of the `rows` they are."""
+    plane, contour = known
+    rings, block = level.rings.take(rows), level.block[rows]
+    boxes = smallest_boxes(rings, plane.xy)
+    sides = street_sides(rings, plane.xy, boxes.axis, contour)
+    draws = uniform(seed, level.lineage[rows], _DRAWS)
+    min_width = rules.min_width[block]
+    too_large = area > rules.max_area[block] * (1.0 + AREA_ROUNDING)
+    narrowest = np.where(too_large, AT_A_PINCH * min_width, min_width)
+    narrowest[rings.n_rings > 1] = 0.0
+    needs_access = sides.frontage >= reached_frontage(area) - MEASURED_M
+    needs_access &= draws[:, 1] < rules.street_access[block]
+    wanted = too_large | (rings.n_rings > 1)
+    wanted |= sides.front > rules.max_width[block] + MEASURED_M
+    # pieces that are reached share its sides along streets
+    wanted &= ~needs_access | (sides.total >= 2.0 * narrowest - MEASURED_M)
+    min_width = np.where(
+        needs_access & (sides.total < 2.0 * min_width - MEASURED_M), narrowest, min_width
+    )
+    shift = rules.irregularity[block] * (draws[:, 0] - 0.5) * boxes.width
+    faces = Faces(
+        rings=rings,
+        boxes=boxes,
+        area=area,
+        least=rules.min_area[block],
+        largest=rules.max_area[block],
+        min_width=min_width,
+        snap=rules.snap[block],
+        narrowest=narrowest,
+        shift=shift,
+        needs_access=needs_access,
+    )
+    chosen = np.flatnonzero(wanted)
+    return faces.take(chosen), chosen
+
+
+def _added_to_plane(part: Halved, boxes: Boxes, plane: _Plane) -> tuple[Rings, _Plane]:
+    """Number the new vertices and segments of cuts on, and return the pieces with them."""
+    rings, n = part.cut.pieces, len(plane.xy)
+    vertex = np.where(
+        rings.vertex >= part.cut.n_vertices, rings.vertex - part.cut.n_vertices + n, rings.vertex
+    )
+    of_edge = part.cut.parent[rings.edge_face] + len(plane.segments.length)
+    segment = np.where(rings.segment == THE_CUT, of_edge, rings.segment)
+    normal = part.lines.normal
+    direction = np.column_stack([-normal[:, 1], normal[:, 0]])
+    reach = boxes.length[part.rows] + boxes.width[part.rows]
+    segments = Segments(
+        np.concatenate([plane.segments.origin, part.lines.point - reach[:, None] * direction]),
+        np.concatenate([plane.segments.direction, direction]),
+        np.concatenate([plane.segments.length, 2.0 * reach]),
+    )
+    return (
+        Rings(vertex, segment, rings.offsets, rings.face),
+        _Plane(np.concatenate([plane.xy, part.cut.added]), segments),
+    )
+
+
+def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: _Tree) -> Pieces:
+    """Collect the faces that stayed whole, in the order of cuts, and node them.
+
+    Where a face is valid no more with the vertices of its neighbours, as may be where it is
+    narrower than coordinates are precise, the one it comes from stays whole instead.
+    """
+    n_ground = len(ground.rings.xy)
+    while True:
+        depth, face = _leaves_in_order(tree)
+        rings = _collected(tree, depth, face)
+        noded, _ = node_rings(rings, plane.xy, plane.segments, n_fixed=n_ground)
+        broken = _broken(noded, plane.xy) & (depth > 0)
+        if not broken.any():
+            break
+        tree = _taken_back(tree, depth[broken], face[broken])
+    noded = _from_lowest(noded, plane.xy)
+    xy, vertex = _used_vertices(plane.xy, noded.vertex, n_ground)
+    first = starts(np.array([len(level.block) for level in tree.levels]))
+    at = first[depth] + face
+    return Pieces(
+        xy=xy,
+        vertex=vertex,
+        offsets=noded.offsets,
+        face=noded.face,
+        access=contour.access(noded.segment),
+        block=np.concatenate([level.block for level in tree.levels])[at],
+        lineage=np.concatenate([level.lineage for level in tree.levels])[at],
+        level=depth,
+        patio=np.zeros(len(at), dtype=bool),
+    )
+
+
+def _leaves_in_order(tree: _Tree) -> tuple[IntArray, IntArray]:
+    """Level and number of the faces that stayed whole, as if pieces replaced what was cut."""
+    levels = tree.levels
+    sizes = [leaf.astype(np.int64) for leaf in tree.leaves]
+    for n in range(len(levels) - 1, 0, -1):
+        np.add.at(sizes[n - 1], levels[n].parent, sizes[n])
+    first = starts(sizes[0])[:-1]
+    position = [first[tree.leaves[0]]]
+    for n in range(1, len(levels)):
+        parent, before = levels[n].parent, starts(sizes[n])[:-1]
+        eldest = np.searchsorted(parent, parent)
+        first = first[parent] + before - before[eldest]
+        position.append(first[tree.leaves[n]])
+    order = np.argsort(np.concatenate(position))
+    face = [leaf.nonzero()[0] for leaf in tree.leaves]
+    depth = np.repeat(np.arange(len(levels)), [len(part) for part in face])
+    return depth[order], np.concatenate(face)[order]
+
+
+def _collected(tree: _Tree, depth: IntArray, face: IntArray) -> Rings:
+    """Return the rings of faces of different levels."""
+    order = np.argsort(depth, kind="stable")
+    cuts = np.searchsorted(depth[order], np.arange(len(tree.levels) + 1))
+    parts = [
+        level.rings.take(face[order[a:b]])
+        for level, a, b in zip(tree.levels, cuts[:-1], cuts[1:], strict=True)
+    ]
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    return join_rings(parts).take(back)
+
+
+def _broken(noded: Rings, xy: FloatArray) -> BoolArray:
+    return ~noded.are_valid(xy)
+
+
+def _taken_back(tree: _Tree, depth: IntArray, face: IntArray) -> _Tree:
+    """Return the tree in which the faces that given ones come from stayed whole."""
+    leaves = [leaf.copy() for leaf in tree.leaves]
+    within = [np.zeros(len(leaf), dtype=bool) for leaf in leaves]
+    for n in range(1, len(leaves)):
+        parent = tree.levels[n].parent
+        whole = parent[face[depth == n]]
+        leaves[n - 1][whole] = True
+        within[n - 1][whole] = True
+    for n in range(1, len(leaves)):
+        parent = tree.levels[n].parent
+        gone = within[n - 1][parent]
+        leaves[n][gone] = False
+        within[n] |= gone
+    return _Tree(tree.levels, leaves)
+
+
+def _from_lowest(rings: Rings, xy: FloatArray) -> Rings:
+    """Start every ring at its lowest vertex, the leftmost of these."""
+    x, y = xy[rings.vertex, 0], xy[rings.vertex, 1]
+    begin = rings.offsets[:-1]
+    low = y == np.repeat(np.minimum.reduceat(y, begin), rings.size)
+    x = np.where(low, x, np.inf)
+    low &= x == np.repeat(np.minimum.reduceat(x, begin), rings.size)
+    first = np.flatnonzero(low)
+    first = first[np.searchsorted(first, begin)] - begin
+    node = ranges(np.zeros(len(begin), dtype=np.int64), rings.size) + np.repeat(first, rings.size)
+    node = node % np.repeat(rings.size, rings.size) + np.repeat(begin, rings.size)
+    return replace(rings, vertex=rings.vertex[node], segment=rings.segment[node])
+
+
+def _used_vertices(xy: FloatArray, vertex: IntArray, n_ground: int) -> tuple[FloatArray, IntArray]:
+    """Drop vertices that are on no ring, but those of the ground."""
+    used = np.zeros(len(xy), dtype=bool)
+    used[:n_ground] = True
+    used[vertex] = True
+    return xy[used], (np.cumsum(used) - 1)[vertex]
