@@ -140,7 +140,9 @@ class Bay:
             if not (min(a, b) <= t <= max(a, b)):
                 continue
             rise = self.h[k + 1] - self.h[k]
-            if abs(b - a) > STEEP * abs(rise):
+            if b - a > STEEP * abs(rise):
+                continue  # seen from behind: the other side of an arc that is open
+            if a - b > STEEP * abs(rise):
                 share = (t - a) / (b - a)
             else:
                 share = 0.0 if (rise > 0.0) == (self.h[k] > TINY) else 1.0

@@ -10,6 +10,9 @@ from itertools import pairwise
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.strips import Strip
 
+TOUCH = 1e-3
+"""A line that passes a vertex nearer than this, in metres, touches it."""
+
 SHARP = 0.5
 """Sine of half the angle of a corner from which the strips along it are rows back to back."""
 
@@ -170,26 +173,29 @@ def _foot(sheet: Sheet, strip: Strip, apex: int, needs: Needs) -> tuple[int, flo
 
 
 def sees(sheet: Sheet, ring: Sequence[int], p: tuple[float, float], q: tuple[float, float]) -> bool:
-    """Whether the line between two points of a ring's boundary runs within the ring."""
+    """Whether the line between two points of a ring's boundary runs within, and touches it not."""
     (px, py), (qx, qy) = p, q
     dx, dy = qx - px, qy - py
     length = math.hypot(dx, dy)
-    tolerance = 1e-6 * length
-    mx, my = px + 0.5 * dx, py + 0.5 * dy
+    dx, dy = dx / length, dy / length
+    mx, my = 0.5 * (px + qx), 0.5 * (py + qy)
     inside = False
     u = ring[-1]
-    ux, uy = sheet.x[u], sheet.y[u]
-    su = (ux - px) * dy - (uy - py) * dx
+    ux, uy = sheet.x[u] - px, sheet.y[u] - py
+    su = ux * dy - uy * dx
     for v in ring:
-        vx, vy = sheet.x[v], sheet.y[v]
-        sv = (vx - px) * dy - (vy - py) * dx
-        if (su > tolerance and sv < -tolerance) or (su < -tolerance and sv > tolerance):
+        vx, vy = sheet.x[v] - px, sheet.y[v] - py
+        sv = vx * dy - vy * dx
+        if -TOUCH < sv < TOUCH and TOUCH < vx * dx + vy * dy < length - TOUCH:
+            return False
+        if (su > 0.0) != (sv > 0.0):
             share = su / (su - sv)
-            at = (ux + share * (vx - ux) - px) * dx + (uy + share * (vy - uy) - py) * dy
-            if 1e-6 * length < at / length < length - 1e-6 * length:
+            at = (ux + share * (vx - ux)) * dx + (uy + share * (vy - uy)) * dy
+            if TOUCH < at < length - TOUCH:
                 return False
-        if (uy > my) != (vy > my) and ux + (my - uy) * (vx - ux) / (vy - uy) > mx:
-            inside = not inside
+        if (uy + py > my) != (vy + py > my):
+            at = ux + px + (my - uy - py) * (vx - ux) / (vy - uy)
+            inside = inside != (at > mx)
         ux, uy, su = vx, vy, sv
     return inside
 

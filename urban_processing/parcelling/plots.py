@@ -124,13 +124,13 @@ class Plots:
         self._put(ring, self.lineage[other], level, self.holes[number] + self.holes[other])
 
     def divide(self, number: int, p: Place, q: Place) -> None:
-        """Divide a parcel by the line between two places of its ring, ``p`` before ``q``."""
+        """Divide a parcel by the line between two places of its ring."""
         ring = self.rings[number]
         # the later one first, so that places before it stay as they are
-        v = self._vertex(number, q)
-        u = self._vertex(number, p)
+        later, earlier = (q, p) if p.edge + p.share < q.edge + q.share else (p, q)
+        u, v = self._vertex(number, later), self._vertex(number, earlier)
         ring = self._take(number)
-        i, j = ring.index(u), ring.index(v)
+        i, j = sorted((ring.index(u), ring.index(v)))
         seed, level = self.lineage[number], self.level[number] + 1
         self._put(ring[i : j + 1], child(seed, 0), level)
         self._put(ring[j:] + ring[: i + 1], child(seed, 1), level)

@@ -26,7 +26,7 @@ from urban_processing.parcelling.mending import Needs, beta_strips
 from urban_processing.parcelling.patios import joined, patio_faces, rows_and_patios
 from urban_processing.parcelling.plots import Plots, edges_of
 from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.slices import Slicer, rings_of_lots
+from urban_processing.parcelling.slices import Lot, Slicer, rings_of_lots
 from urban_processing.parcelling.spacing import Bounds
 from urban_processing.parcelling.streets import logical_streets, sides_of_rings
 from urban_processing.parcelling.strips import Strip, alpha_strips
@@ -35,6 +35,9 @@ from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 LEAST_FRONT = 0.75
 """Shortest front of a strip, over the smallest width."""
+
+TURN = 0.8
+"""Length over which turns of a street count as one, over the depth of the deepest row."""
 
 TILED = 1e-9
 """Share of a polygon's area that its faces may miss or hold twice."""
@@ -74,13 +77,14 @@ def divide_in_rows(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     Graphics Forum 31(2), section 4.2 and algorithm 1.
     """
     polygons = list(polygons_of(ground))
-    parts = [_divide(polygon, rules, k, seed) for k, polygon in enumerate(polygons)]
+    parts = [_divide(polygon, rules, k, seed=seed) for k, polygon in enumerate(polygons)]
     pieces = assembled(ground, parts)
-    unsound = _unsound(ground, pieces)
-    if len(unsound):
-        for k in unsound.tolist():
-            parts[k] = whole(polygons[k])
-        pieces = assembled(ground, parts)
+    for last in (False, True):
+        for k in (unsound := _unsound(ground, pieces).tolist()):
+            polygon = polygons[k]
+            parts[k] = whole(polygon) if last else _divide(polygon, rules, k, seed=seed, wary=True)
+        if unsound:
+            pieces = assembled(ground, parts)
     return pieces
 
 
@@ -109,8 +113,8 @@ def _bounds(rules: Rules, k: int) -> Bounds:
     )
 
 
-def _divide(polygon: Polygon, rules: Rules, k: int, seed: int) -> Divided:
-    """Divide one polygon."""
+def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = False) -> Divided:
+    """Divide one polygon; if `wary`, without the lines that make parcels cross themselves."""
     bounds = _bounds(rules, k)
     area = float(ring_areas(polygon.xy, polygon.offsets).sum())
     if area < 2.0 * bounds.min_area or not any(polygon.access):
@@ -137,9 +141,11 @@ def _divide(polygon: Polygon, rules: Rules, k: int, seed: int) -> Divided:
     strips, left = beta_strips(sheet, strips, needs, inside)
     if left:
         patios = joined(sheet, patios, [strip.ring for strip in left])
-    plots = _parcels(sheet, polygon, strips, bounds, seed)
+    parts = [_lots(sheet, polygon, strip, bounds, seed=seed, wary=wary) for strip in strips]
+    plots = _plots(sheet, polygon, parts)
     tidy(plots, bounds)
-    divide_large(plots, bounds)
+    if not wary:
+        divide_large(plots, bounds)
     faces = [
         Face([plots.rings[n], *plots.holes[n]], plots.lineage[n], plots.level[n])
         for n in sorted(plots.rings)
@@ -154,10 +160,11 @@ def _alpha_strips(
 ) -> list[Strip]:
     """Return the α-strips, ranked by what does not depend on where rings begin."""
     x, y = polygon.xy.mean(axis=0).tolist()
+    depth = TURN * float(skeleton.height.max())
     streets = [
         street
         for ring in sides_of_rings(sheet, polygon, skeleton.edge_face.tolist())
-        for street in logical_streets(ring, (x, y), corner=corner, reach=needs.reach)
+        for street in logical_streets(ring, (x, y), corner=corner, reach=needs.reach, depth=depth)
     ]
     strips = alpha_strips(sheet, [face.tolist() for face in skeleton.faces], streets)
     strips.sort(
@@ -173,17 +180,26 @@ def _alpha_strips(
     return strips
 
 
-def _parcels(
-    sheet: Sheet, polygon: Polygon, strips: Sequence[Strip], bounds: Bounds, seed: int
-) -> Plots:
-    """Divide each strip into parcels."""
-    parts = []
-    for strip in strips:
-        slicer = Slicer(sheet, strip, bounds)
-        lineage = child(polygon.lineage, strip.rank)
-        count = int(slicer.length / bounds.min_width) + 2
-        draws = uniform(seed, np.array([lineage], dtype=np.uint64), count)[0].tolist()
-        parts.append((strip, slicer.lots(slicer.cuts(draws)), lineage))
+def _lots(
+    sheet: Sheet, polygon: Polygon, strip: Strip, bounds: Bounds, *, seed: int, wary: bool
+) -> tuple[Strip, list[Lot], int]:
+    """Divide a strip into parcels; return its seed too."""
+    slicer = Slicer(sheet, strip, bounds)
+    lineage = child(polygon.lineage, strip.rank)
+    count = int(slicer.length / bounds.min_width) + 2
+    cuts = slicer.cuts(uniform(seed, np.array([lineage], dtype=np.uint64), count)[0].tolist())
+    lots = slicer.lots(cuts)
+    while wary and cuts:
+        parts = rings_of_lots(sheet, strip, lots)
+        crossed = {k for k, part in enumerate(parts) if not all(map(sheet.is_sound, part))}
+        if not crossed:
+            break
+        cuts = [cut for k, cut in enumerate(cuts) if not {k, k + 1} & crossed]
+        lots = slicer.lots(cuts)
+    return strip, lots, lineage
+
+
+def _plots(sheet: Sheet, polygon: Polygon, parts: Sequence[tuple[Strip, list[Lot], int]]) -> Plots:
     polygons: list[list[list[int]]] = []
     seeds: list[int] = []
     for strip, lots, lineage in parts:

@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
+import shapely
+
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.parcelling.ground import FINE_GRID
 
@@ -145,6 +147,11 @@ class Sheet:
             return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
         return max(ends, key=turn)
+
+    def is_sound(self, rings: Sequence[Sequence[int]]) -> bool:
+        """Whether rings, the shell first, make a valid polygon."""
+        shell, *holes = ([(self.x[v], self.y[v]) for v in ring] for ring in rings)
+        return bool(shapely.is_valid(shapely.Polygon(shell, holes)))
 
     def area(self, ring: Sequence[int]) -> float:
         """Signed area of a ring."""

@@ -18,6 +18,9 @@ from urban_processing.parcelling.strips import Strip
 STEP = 0.5
 """Distance of the places where the depth of a strip is measured, over the smallest width."""
 
+CLOSE = 0.1
+"""Lines that end this near to a vertex of the back, in metres, end there."""
+
 TRIES = ((1.0, True, 1.01), (1.0, False, 1.01), (0.0, False, 1.05))
 """Shares of ω, whether lines are moved to vertices, and margins over the smallest area, in the
 order in which they are tried. Areas of a profile are a little off, hence the margins."""
@@ -118,7 +121,17 @@ class Slicer:
 
     def _cast(self, s: float) -> Hit:
         bay = self.bay_at(s)
-        return bay.cast(s - bay.start)
+        return self._joined(bay.cast(s - bay.start))
+
+    def _joined(self, hit: Hit) -> Hit:
+        """Take a vertex of the back that is very close instead."""
+        edge = min(math.floor(hit.at), len(self.strip.back) - 2)
+        sheet = self.sheet
+        for k in (edge, edge + 1):
+            v = self.strip.back[k]
+            if math.hypot(sheet.x[v] - hit.x, sheet.y[v] - hit.y) < CLOSE:
+                return Hit(float(k), sheet.x[v], sheet.y[v])
+        return hit
 
     def cuts(self, draws: list[float]) -> list[Cut]:
         """Return the lines, in the order of the front.
@@ -152,7 +165,7 @@ class Slicer:
         return s
 
     def _snapped(self, s: float) -> tuple[float, Hit]:
-        snap = self.bounds.snap
+        snap = max(self.bounds.snap, CLOSE)
         k = bisect.bisect(self.s, s)
         near = min(
             (self.s[j] for j in (k - 1, k) if 0 < j < len(self.s) - 1),
@@ -169,7 +182,7 @@ class Slicer:
         best: tuple[float, float, Hit] | None = None
         for share, vertex in [(0.0, u), *sheet.between(u, v), (1.0, v)]:
             x, y = sheet.x[vertex], sheet.y[vertex]
-            if abs(x - hit.x) + abs(y - hit.y) > 2.0 * snap:
+            if math.hypot(x - hit.x, y - hit.y) > 2.0 * snap:
                 continue
             t = (x - bay.x) * bay.dx + (y - bay.y) * bay.dy
             origin = bay.origin(t)
@@ -181,7 +194,7 @@ class Slicer:
             seen = bay.reach(t)
             if abs(seen.x - x) + abs(seen.y - y) < 1e-3:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
-        return (s, hit) if best is None else best[1:]
+        return (s, self._joined(hit)) if best is None else best[1:]
 
     def _within_bounds(self, cuts: list[Cut]) -> bool:
         """Whether no parcel is too small and no lines cross."""
@@ -191,12 +204,9 @@ class Slicer:
         )
 
     def _clear(self, cut: Cut) -> bool:
-        """Whether a line runs within the strip; one that is not moved does."""
+        """Whether a line runs within the strip."""
         bay = self.bay_at(cut.s)
         px, py = bay.x + (cut.s - bay.start) * bay.dx, bay.y + (cut.s - bay.start) * bay.dy
-        ex, ey = cut.hit.x - px, cut.hit.y - py
-        if abs(ex * bay.dx + ey * bay.dy) < 1e-3 * math.hypot(ex, ey):
-            return True
         return sees(self.sheet, self.ring, (px, py), (cut.hit.x, cut.hit.y))
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:

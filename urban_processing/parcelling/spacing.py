@@ -117,17 +117,18 @@ class Profile:
         move
             Moves an end to a place that suits better, if it is near.
         margin
-            How much larger than the smallest area and width parcels are kept.
+            How far from the bounds of areas parcels are kept, as a factor.
         """
         b = self.bounds
         count = len(shares)
         area, width = b.min_area * margin, b.min_width * min(margin, 1.001)
+        most = b.max_area / margin
         latest, earliest = [self.length], [self.length]
         for _ in range(count):
             s = latest[-1]
             latest.append(min(s - width, self.spot_of(self.area_at(s) - area)))
             s = earliest[-1]
-            earliest.append(max(s - b.max_width, self.spot_of(self.area_at(s) - b.max_area)))
+            earliest.append(max(s - b.max_width, self.spot_of(self.area_at(s) - most)))
         if latest[-1] < -1e-6:
             return None
         ends: list[float] = []
@@ -139,7 +140,7 @@ class Profile:
             high = latest[count - 1 - k]
             if low > high + 1e-9:
                 return None
-            largest = min(at + b.max_width, self.spot_of(before + b.max_area))
+            largest = min(at + b.max_width, self.spot_of(before + most))
             low = max(low, min(earliest[count - 1 - k], high))
             high = max(min(high, largest), low)
             moved = move(aim)

@@ -133,7 +133,12 @@ def _side(sheet: Sheet, polygon: Polygon, face: int, start: int, stop: int) -> S
 
 
 def logical_streets(
-    ring: Sequence[Side], center: tuple[float, float], *, corner: float, reach: float
+    ring: Sequence[Side],
+    center: tuple[float, float],
+    *,
+    corner: float,
+    reach: float,
+    depth: float,
 ) -> list[Street]:
     """Divide a ring of sides into logical streets (Vanegas 2012, section 4.2.1).
 
@@ -141,7 +146,8 @@ def logical_streets(
     length ``reach``, so that several small bends of a rounded corner count as one and a jag of
     the contour as none; of the places within ``reach`` that bend so, the one that bends most.
     It also begins where the number of the street changes at a bend of more than `NAMED_BEND`,
-    and where access does.
+    where access does, and in the middle of a turn so tight that lines at right angles to it would
+    meet within the rows, unless the whole ring is one such turn.
 
     Parameters
     ----------
@@ -151,14 +157,16 @@ def logical_streets(
         A point within the block: a ring without a break begins at the vertex furthest from it.
     corner
         Angle in degrees.
-    reach
-        Length in metres.
+    reach, depth
+        Lengths in metres; that of the chords, and depth of the rows.
     """
     bends = _bends(ring, reach)
     starts = {k for k in range(len(ring)) if ring[k].access != ring[k - 1].access}
     at = _positions(ring)
     starts |= _corners(bends, at, corner=corner, reach=reach, taken=starts)
     starts |= _renamed(ring, bends, at, reach=reach, taken=starts)
+    if len(starts) > 1 and depth > reach:
+        starts |= _tight_turns(ring, at, corner=corner, depth=depth, taken=starts)
     if not starts and not ring[0].access:
         starts = set(range(len(ring)))
     if len(starts) > 1:
@@ -236,6 +244,18 @@ def _corners(
         else:
             found.add(k)
     return {k for k in found if not _near(k, taken, at, reach)}
+
+
+def _tight_turns(
+    ring: Sequence[Side], at: Sequence[float], *, corner: float, depth: float, taken: set[int]
+) -> set[int]:
+    """Sides that begin where a street turns inwards by more than a corner within the depth."""
+    bends = _bends(ring, depth)
+    clear = [
+        bend if bend > 0.0 and not _near(k, taken, at, 2.0 * depth) else 0.0
+        for k, bend in enumerate(bends)
+    ]
+    return _corners(clear, at, corner=corner, reach=depth, taken=taken)
 
 
 def _renamed(

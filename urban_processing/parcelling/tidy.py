@@ -92,5 +92,4 @@ def _halving(plots: Plots, number: int, bounds: Bounds) -> tuple[Place, Place] |
                 best = (share, p, q)
     if best is None:
         return None
-    _, p, q = best
-    return (p, q) if p.edge + p.share < q.edge + q.share else (q, p)
+    return best[1:]
