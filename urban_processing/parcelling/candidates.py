@@ -109,17 +109,24 @@ class View:
         (K,) the middle, moved, with the smallest area on both sides.
     snapped
         (K,) the same through a corner of the contour where one is near.
+    turned
+        Whether the axes are the other ones.
     """
 
     faces: Faces
     sweep: Sweep
     regular: FloatArray
     snapped: FloatArray
+    turned: bool
 
     def take(self, rows: IntArray) -> View:
         """Return the view of some of the faces."""
         return View(
-            self.faces.take(rows), self.sweep.take(rows), self.regular[rows], self.snapped[rows]
+            faces=self.faces.take(rows),
+            sweep=self.sweep.take(rows),
+            regular=self.regular[rows],
+            snapped=self.snapped[rows],
+            turned=self.turned,
         )
 
     def at_shares(self, rows: IntArray, shares: FloatArray) -> FloatArray:
@@ -140,7 +147,7 @@ def view_along(faces: Faces, xy: FloatArray, contour: Contour, *, turned: bool) 
     boxes = faces.boxes.turned(np.ones(len(faces), dtype=bool)) if turned else faces.boxes
     sweep = sweep_along(faces.rings, xy, boxes)
     regular = _regular(faces, sweep)
-    return View(faces, sweep, regular, _snapped(faces, sweep, regular, contour))
+    return View(faces, sweep, regular, _snapped(faces, sweep, regular, contour), turned)
 
 
 def _regular(faces: Faces, sweep: Sweep) -> FloatArray:

@@ -12,9 +12,10 @@ from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.boxes import Boxes, smallest_boxes
 from urban_processing.parcelling.candidates import Contour, Faces
 from urban_processing.parcelling.ground import Ground, Pieces, Rules, UintArray
-from urban_processing.parcelling.halving import Halved, halve, street_sides
+from urban_processing.parcelling.halving import Halved, halve
 from urban_processing.parcelling.line_cuts import THE_CUT
 from urban_processing.parcelling.noding import Segments, node_rings
+from urban_processing.parcelling.quality import fronts_of
 from urban_processing.parcelling.rings import Rings, join_rings, ranges, starts
 from urban_processing.site import AREA_ROUNDING
 
@@ -58,7 +59,7 @@ class _Tree:
 def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     """Halve faces across their oriented boxes until they are small enough.
 
-    A face is halved while its area is above `max_area`, its front (`halving.street_sides`) is
+    A face is halved while its area is above `max_area`, its front (`quality.fronts_of`) is
     wider than `max_width`, or it has holes, if each piece keeps `min_area`. The cut goes across
     the longer side of the smallest box along an edge, through its middle, moved by ω·r
     times the *shorter* side with r between −½ and ½; so far only that `min_area` is left on both
@@ -168,7 +169,7 @@ def _faces_at(
     plane, contour = known
     rings, block = level.rings.take(rows), level.block[rows]
     boxes = smallest_boxes(rings, plane.xy)
-    sides = street_sides(rings, plane.xy, boxes.axis, contour)
+    sides = fronts_of(rings, plane.xy, boxes.axis, contour)
     draws = uniform(seed, level.lineage[rows], _DRAWS)
     min_width = rules.min_width[block]
     too_large = area > rules.max_area[block] * (1.0 + AREA_ROUNDING)
