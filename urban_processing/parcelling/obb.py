@@ -11,6 +11,7 @@ from urban_processing.hashing import splitmix64, uniform
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.boxes import Boxes, smallest_boxes
 from urban_processing.parcelling.candidates import Contour, Faces
+from urban_processing.parcelling.compose import join_pieces, part_of_ground, part_of_rules
 from urban_processing.parcelling.ground import Ground, Pieces, Rules, UintArray
 from urban_processing.parcelling.halving import Halved, halve
 from urban_processing.parcelling.line_cuts import THE_CUT
@@ -25,6 +26,9 @@ STRAIGHT = 1e-3
 AT_A_PINCH = 0.5
 """Share of the smallest width that pieces of a face above the largest area may be down to, where
 none keeps it: a front somewhat narrow is less of an evil than a parcel that is far too large."""
+
+PARCELS_AT_ONCE = 50_000
+"""About as many parcels, if all were as small as allowed, are worked on at once."""
 
 _DRAWS = 2
 
@@ -87,6 +91,29 @@ def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     Pieces
         Parcels in the order of their polygons; within one in the order of the cuts.
     """
+    batches = _batches(ground, rules)
+    if len(batches) <= 1:
+        return _divide(ground, rules, seed)
+    parts = [
+        _divide(part_of_ground(ground, batch), part_of_rules(rules, batch), seed)
+        for batch in batches
+    ]
+    sizes = np.diff(ground.rings.offsets)
+    block = ground.rings.block
+    return join_pieces(parts, [int(sizes[np.isin(block, batch)].sum()) for batch in batches])
+
+
+def _batches(ground: Ground, rules: Rules) -> list[IntArray]:
+    """Polygons that are worked on together: as many as the processor's caches hold well."""
+    area = _first_level(ground).rings.areas(ground.rings.xy)
+    n_parcels = np.cumsum(area / rules.min_area)
+    return np.split(
+        np.arange(len(ground)), np.flatnonzero(np.diff(n_parcels // PARCELS_AT_ONCE)) + 1
+    )
+
+
+def _divide(ground: Ground, rules: Rules, seed: int) -> Pieces:
+    """Divide all polygons together, level by level."""
     contour = _contour_of(ground)
     levels = [_first_level(ground)]
     plane = _Plane(ground.rings.xy, _edge_segments(ground))

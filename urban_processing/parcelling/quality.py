@@ -9,7 +9,7 @@ import numpy as np
 from urban_processing.access_rule import MEASURED_M, reached_frontage
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.parcelling.candidates import Contour, Faces
-from urban_processing.parcelling.line_cuts import Cut
+from urban_processing.parcelling.line_cuts import TOUCH, Cut
 from urban_processing.parcelling.rings import Rings
 from urban_processing.parcelling.sweep import Sweep
 from urban_processing.site import AREA_ROUNDING
@@ -60,12 +60,14 @@ def quality_of_halves(faces: Faces, sweep: Sweep, place: FloatArray, contour: Co
     face = faces.rings.edge_face[node]
     after = faces.rings.following[node]
     begin, end, at = sweep.along[node], sweep.along[after], place[face]
-    run = end - begin
+    run, rise = end - begin, sweep.across[after] - sweep.across[node]
     before = np.minimum(end, at) - np.minimum(begin, at)
     flat = run == 0.0
     before = np.where(flat, begin <= at, before / np.where(flat, 1.0, run))
+    on = (np.abs(begin - at) <= TOUCH) & (np.abs(end - at) <= TOUCH)
+    before[on] = rise[on] > 0.0  # an edge along the line is on the side of its face
     share = np.stack([before, 1.0 - before])
-    sides = _measured(run, sweep.across[after] - sweep.across[node], (face, share), len(faces))
+    sides = _measured(run, rise, (face, share), len(faces))
     area = np.minimum(np.maximum(sweep.areas(place), 0.0), faces.area)
     return np.maximum(_quality(faces, area, sides[0]), _quality(faces, faces.area - area, sides[1]))
 
