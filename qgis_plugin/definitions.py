@@ -24,7 +24,7 @@ from qgis.core import (
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind, Output, OutputKind
 from urban_processing.algorithms.words import limits_in_words
 from urban_processing.params import ParamField
-from urban_processing.schema import LAID_OUT, GeometryType, Layer
+from urban_processing.schema import GeometryType, Layer
 
 CRS = "CRS"
 """The CRS to work in, as ``--crs`` on the command line."""
@@ -44,6 +44,14 @@ _LAYERS = {
     InputKind.LOCKED_LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.RIM_LINES: QgsProcessing.SourceType.TypeVectorLine,
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
+    InputKind.CENTRELINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
 }
 """Inputs that are layers, and their geometry."""
 
@@ -56,8 +64,10 @@ _SINK_TYPES = {
 }
 """Geometry of the sink of a layer; places stand for areas where a layer has both."""
 
+_GEOPACKAGE = "GeoPackage (*.gpkg)"
 _FILES = {
-    OutputKind.LAYOUT: "GeoPackage (*.gpkg)",
+    OutputKind.LAYOUT: _GEOPACKAGE,
+    OutputKind.LAYERS: _GEOPACKAGE,
     OutputKind.MAP: "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)",
 }
 """Outputs that are single files. An export, a folder of plain files, is none of QGIS's: each
@@ -66,7 +76,7 @@ sink goes to a file of its own."""
 
 @dataclass(frozen=True)
 class SinkName:
-    """A sink: a layer of a layout output."""
+    """A sink: a layer of an output that has several."""
 
     output: Output
     layer: Layer
@@ -94,9 +104,8 @@ def is_given(parameters: Mapping[str, Any], name: str) -> bool:
 def sinks(spec: AlgorithmSpec) -> Iterator[SinkName]:
     """Yield the sinks of an algorithm in the order of asking: those made by default first."""
     for output in spec.outputs:
-        if output.kind is OutputKind.LAYOUT:
-            for layer in sorted(LAID_OUT, key=lambda layer: not layer.shown):
-                yield SinkName(output, layer)
+        for layer in sorted(output.layers, key=lambda layer: not layer.shown):
+            yield SinkName(output, layer)
 
 
 def files(spec: AlgorithmSpec) -> Iterator[Output]:
@@ -129,7 +138,7 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     for field in plain:
         if field not in first:
             yield _parameter(field)
-    if input_of(spec, InputKind.BOUNDARY):
+    if any(item.kind.chooses_crs for item in spec.inputs):
         crs = QgsProcessingParameterCrs(CRS, "CRS to work in", optional=True)
         yield _helped(crs, _CRS_HELP)
     for field in fields:
@@ -162,7 +171,7 @@ def _input(item: Input) -> QgsProcessingParameterDefinition:
         name,
         item.label,
         QgsProcessingParameterFile.Behavior.File,
-        fileFilter=_FILES[OutputKind.LAYOUT],
+        fileFilter=_GEOPACKAGE,
         optional=optional,
     )
     return _helped(file, item.help)
@@ -218,7 +227,8 @@ def _sink(sink: SinkName) -> QgsProcessingParameterFeatureSink:
         createByDefault=layer.shown,
     )
     columns = ", ".join(column.name for column in layer.columns)
-    return _helped(definition, f"Layer with the columns {columns}.")
+    more = ", and those carried along" if layer.open else ""
+    return _helped(definition, f"Layer with the columns {columns}{more}.")
 
 
 def _helped(

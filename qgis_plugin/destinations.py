@@ -89,6 +89,7 @@ class Destinations:
         taken = [(place, "the input") for place in self._read()]
         checks = {
             OutputKind.LAYOUT: geopackage_problems,
+            OutputKind.LAYERS: geopackage_problems,
             OutputKind.MAP: map_problems,
         }
         for name, place in self._sink_places().items():
@@ -100,7 +101,7 @@ class Destinations:
             label = self._label(name)
             problems += [f"{label}: {problem}" for problem in checks[output.kind](path)]
             problems += _collisions(label, Place(path.resolve()), taken)
-            if output.kind is OutputKind.LAYOUT and path.resolve() in self._loaded():
+            if output.kind.is_geopackage and path.resolve() in self._loaded():
                 problems.append(
                     f"{label}: {path} is open in this project: remove its layers from it, or "
                     "choose another name."
@@ -139,7 +140,7 @@ class Destinations:
             name = parameter_name(item.name)
             if not is_given(self.parameters, name):
                 continue
-            if item.kind is InputKind.LAYOUT:
+            if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION):
                 found.add(Place(Path(str(self.parameters[name])).resolve()))
                 continue
             layer = self.algorithm.parameterAsVectorLayer(self.parameters, name, self.context)

@@ -18,8 +18,8 @@ from urban_processing.layout_file.geopackage import (
     VERSION,
     field_values,
 )
-from urban_processing.metrics.tables import Table
 from urban_processing.schema import ColumnType, GeometryType, Layer
+from urban_processing.tables import Table
 
 _FIELDS = {
     ColumnType.INTEGER: ogr.OFTInteger64,
@@ -86,6 +86,9 @@ OGR = Ogr()
 def _write_layer(file: Any, layer: Layer, table: Table, system: Any) -> None:
     options = [f"IDENTIFIER={layer.title}"]
     kind = _GEOMETRIES[layer.geometry]
+    several = kind == ogr.wkbPolygon and table.in_pieces
+    if several:
+        kind = ogr.wkbMultiPolygon
     if kind != ogr.wkbNone:
         options += [f"GEOMETRY_NAME={GEOMETRY_COLUMN}", "SPATIAL_INDEX=YES"]
     made = _required(
@@ -107,7 +110,8 @@ def _write_layer(file: Any, layer: Layer, table: Table, system: Any) -> None:
             if values[row] is not None:
                 feature.SetField(i, values[row])
         if wkb is not None:
-            feature.SetGeometryDirectly(ogr.CreateGeometryFromWkb(wkb))
+            made_of = ogr.CreateGeometryFromWkb(wkb)
+            feature.SetGeometry(ogr.ForceToMultiPolygon(made_of) if several else made_of)
         _succeeded(made.CreateFeature(feature))
     _succeeded(file.CommitTransaction())
 

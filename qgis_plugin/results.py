@@ -23,8 +23,8 @@ from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.styling import ResultGroup
 from urban_processing.layout_file.geopackage import field_values
-from urban_processing.metrics.tables import Table
 from urban_processing.schema import GeometryType, Layer
+from urban_processing.tables import Table
 
 _TYPES = {
     GeometryType.NONE: QgsWkbTypes.Type.NoGeometry,

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingFeedback
 
 from qgis_plugin.crs import crs_of
+from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
-from qgis_plugin.geopackage import OGR
+from qgis_plugin.products import product
 from qgis_plugin.results import write_sink
 from qgis_plugin.sources import Sources
 from qgis_plugin.styling import ResultGroup
-from urban_processing.algorithms import AlgorithmSpec, InputKind, Output, OutputKind
+from urban_processing.algorithms import AlgorithmSpec
 from urban_processing.algorithms.words import estimate_in_words
-from urban_processing.layout_file.files import as_written, write_layout
-from urban_processing.metrics import MeasuredLayout
 from urban_processing.params import Params
 from urban_processing.progress import MANY_PARCELS, Progress
 
@@ -48,7 +45,7 @@ def run(
         Ids of layers and paths of files by parameter, as QGIS wants them.
     """
     spec = algorithm.spec
-    sources = Sources(algorithm, destinations.parameters, destinations.context, feedback)
+    sources = Sources(algorithm, destinations.parameters, destinations.context, feedback, params)
     inputs = sources.read()
     _say_what_inputs_say(spec, inputs, feedback)
     if spec.estimate is not None:
@@ -56,39 +53,40 @@ def run(
         say = feedback.pushWarning if estimate.parcels > MANY_PARCELS else feedback.pushInfo
         say(f"Expected: {estimate_in_words(estimate)}.")
     made = spec.run(inputs, params, progress.slice(0.0, _COMPUTING))
-    layouts = {
-        output.name: MeasuredLayout(as_written(made[output.name]))
+    progress.update(_COMPUTING, "Measuring the results")
+    products = {
+        output.name: product(output.kind, made[output.name])
         for output in spec.outputs
-        if output.kind is OutputKind.LAYOUT
+        if output.kind.is_geopackage
     }
-    progress.update(_COMPUTING, "Measuring the layout")
-    broken = [check for layout in layouts.values() for check in layout.certificate.failures]
     # the last moment at which a run can be cancelled: what is written from here on stays
     progress.update(0.95, "Writing the results")
     results: dict[str, Any] = {}
     for name, (output, path) in destinations.files.items():
-        _write_file(output, layouts, path)
+        whole = products[output.of or output.name]
+        (whole.write if output.kind.is_geopackage else whole.plot)(path)
         results[name] = str(path)
     groups = {
-        name: ResultGroup(_title(sources.name, spec, params), _history(layout))
-        for name, layout in layouts.items()
+        name: ResultGroup(_title(sources.name, spec, params), whole.history)
+        for name, whole in products.items()
     }
     for sink in destinations.sinks:
-        layout = layouts[sink.output.name]
+        whole = products[sink.output.name]
+        made_of, table = whole.layer(sink.layer)
         results[sink.parameter] = write_sink(
-            sink,
-            layout.tables.get(sink.layer.name),
+            SinkName(sink.output, made_of),
+            table,
             destinations,
-            crs=layout.layout.frame.crs,
+            crs=whole.crs,
             group=groups[sink.output.name],
         )
-    for layout in layouts.values():
-        for name, value in layout.summary():
+    for whole in products.values():
+        for name, value in whole.summary:
             feedback.pushInfo(f"{name}: {value}")
+    broken = [message for whole in products.values() for message in whole.broken]
     if broken:
         feedback.reportError(
-            "The layout was made, but not all that it promises holds:\n"
-            + "\n".join(check.message for check in broken)
+            "The layout was made, but not all that it promises holds:\n" + "\n".join(broken)
         )
     return results
 
@@ -96,24 +94,14 @@ def run(
 def _say_what_inputs_say(
     spec: AlgorithmSpec, inputs: Mapping[str, Any], feedback: QgsProcessingFeedback
 ) -> None:
-    """Say which CRS is worked in, and what was repaired or changed in reading a boundary."""
+    """Say which CRS is worked in, and what was repaired or changed in reading the inputs."""
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY and inputs[item.name] is not None:
-            site = inputs[item.name]
-            for issue in site.issues:
+        read = inputs.get(item.name)
+        if item.kind.is_ground and read is not None:
+            for issue in read.issues:
                 feedback.pushInfo(in_qgis(issue.message))
-            crs = crs_of(site.frame.crs)
+            crs = crs_of(read.frame.crs)
             feedback.pushInfo(f"CRS of the results: {crs.userFriendlyIdentifier()}.")
-
-
-def _write_file(output: Output, layouts: Mapping[str, MeasuredLayout], path: Path) -> None:
-    layout = layouts[output.of or output.name]
-    if output.kind is OutputKind.LAYOUT:
-        write_layout(layout.layout, path, library=OGR, overwrite=True, tables=layout.tables)
-    else:
-        from urban_processing.report.map import plot_layout
-
-        plot_layout(layout, path)
 
 
 def _title(land: str, spec: AlgorithmSpec, params: Params) -> str:
@@ -121,11 +109,3 @@ def _title(land: str, spec: AlgorithmSpec, params: Params) -> str:
     seed = params.as_dict().get("seed")
     words = [land, spec.name, "" if seed is None else f"seed {seed}"]
     return ", ".join(filter(None, words))
-
-
-def _history(layout: MeasuredLayout) -> list[str]:
-    return [
-        f"{step.algorithm} {step.version}, seed {step.seed}, input {step.input_sha256}, "
-        f"parameters {json.dumps(dict(step.parameters), ensure_ascii=False)}"
-        for step in layout.layout.history
-    ]

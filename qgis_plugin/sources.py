@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from qgis.core import (
     QgsProcessingFeedback,
     QgsWkbTypes,
 )
+from qgis.PyQt.QtCore import QDate, QDateTime, Qt, QTime
 
 from qgis_plugin.crs import QgisCrs
 from qgis_plugin.definitions import CRS, input_of, is_given, parameter_name
@@ -28,18 +29,31 @@ from qgis_plugin.feedback import stop_if_cancelled
 from qgis_plugin.geopackage import OGR
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
 from urban_processing.algorithms.choices import layout_problems
+from urban_processing.blocks.model import Blocks
+from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError
+from urban_processing.intake.block_values import block_columns
+from urban_processing.intake.blocks import build_blocks
+from urban_processing.intake.editions import EditionLayers, build_editions
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
 from urban_processing.intake.sites import build_site
+from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
+from urban_processing.layout_file.subdivisions import read_subdivision
+from urban_processing.params import Params
+from urban_processing.params.subdivide import SubdivideParams
+from urban_processing.parcelling.reuse import Previous
+from urban_processing.persistence.editions import Editions
 from urban_processing.site import Site
 
 if TYPE_CHECKING:
     from qgis_plugin.algorithm import SpecAlgorithm
 
+
+_TIMES = (QDate, QDateTime, QTime)
 
 _SNAP = "snap"
 """The parameter that edited layers are read with."""
@@ -52,6 +66,8 @@ class Sources:
     ----------
     algorithm, parameters, context, feedback
         As QGIS gives them.
+    params
+        The parameters as the engine takes them.
     """
 
     def __init__(
@@ -60,7 +76,9 @@ class Sources:
         parameters: Mapping[str, Any],
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
+        params: Params,
     ) -> None:
+        self.params = params
         self.algorithm = algorithm
         self.parameters = dict(parameters)
         self.context = context
@@ -76,12 +94,18 @@ class Sources:
         UrbanError
             With everything that is wrong with them.
         """
+        readers: Mapping[InputKind, Callable[[Input], Any]] = {
+            InputKind.BOUNDARY: self._site,
+            InputKind.LAYOUT: self._layout,
+            InputKind.CENTRELINES: self._streets,
+            InputKind.BLOCK_LAYER: self._blocks,
+            InputKind.SUBDIVISION: self._subdivision,
+            InputKind.PARCELS_BEFORE: self._editions,
+        }
         inputs: dict[str, Any] = {}
         for item in self.algorithm.spec.inputs:
-            if item.kind is InputKind.BOUNDARY:
-                inputs[item.name] = self._site(item)
-            elif item.kind is InputKind.LAYOUT:
-                inputs[item.name] = self._layout(item)
+            if item.kind in readers:
+                inputs[item.name] = readers[item.kind](item)
         return inputs
 
     def _site(self, item: Input) -> Site | None:
@@ -95,11 +119,10 @@ class Sources:
             if kind.of_site
             for layer in (input_of(self.algorithm.spec, kind),)
         }
-        asked = self.algorithm.parameterAsCrs(self.parameters, CRS, self.context)
         return build_site(
             features,
             library=QgisCrs(self.context.transformContext()),
-            asked=asked if asked.isValid() else None,
+            asked=self._asked_crs(),
             corners=layers[InputKind.CORNER_POINTS],
             given=GivenLayers(
                 fixed_streets=layers[InputKind.FIXED_STREETS],
@@ -109,6 +132,49 @@ class Sources:
                 entries=layers[InputKind.ENTRY_POINTS],
             ),
         )
+
+    def _streets(self, item: Input) -> StreetsOnLand | None:
+        """Read centrelines, and the land they are on."""
+        features = self._features(item, STREET_COLUMNS)
+        if features is None:
+            return None
+        self.name = self.name or features.name
+        land = input_of(self.algorithm.spec, InputKind.LAND)
+        return build_streets(
+            features,
+            library=QgisCrs(self.context.transformContext()),
+            asked=self._asked_crs(),
+            land=None if land is None else self._features(land),
+        )
+
+    def _blocks(self, item: Input) -> Blocks | None:
+        """Read blocks, and the streets along them."""
+        features = self._features(item, block_columns())
+        if features is None:
+            return None
+        self.name = self.name or features.name
+        streets = input_of(self.algorithm.spec, InputKind.BLOCK_STREETS)
+        params = self.params if isinstance(self.params, SubdivideParams) else None
+        return build_blocks(
+            features,
+            library=QgisCrs(self.context.transformContext()),
+            asked=self._asked_crs(),
+            streets=None if streets is None else self._features(streets, STREET_COLUMNS),
+            params=params,
+        )
+
+    def _subdivision(self, item: Input) -> Previous | None:
+        """Read a subdivision made before, if one was given."""
+        name = parameter_name(item.name)
+        if not is_given(self.parameters, name):
+            return None
+        path = self.algorithm.parameterAsFile(self.parameters, name, self.context)
+        return read_subdivision(path, library=OGR)
+
+    def _asked_crs(self) -> QgsCoordinateReferenceSystem | None:
+        """Return the CRS to work in, if one was given."""
+        asked = self.algorithm.parameterAsCrs(self.parameters, CRS, self.context)
+        return asked if asked.isValid() else None
 
     def _layout(self, item: Input) -> Layout | None:
         """Read a layout, from its file or from two layers."""
@@ -139,7 +205,32 @@ class Sources:
         crs = QgisCrs(self.context.transformContext())
         return build_layout(*found, library=crs, snap=snap or 0.0)
 
-    def _features(self, item: Input) -> Features[QgsCoordinateReferenceSystem] | None:
+    def _editions(self, item: Input) -> Editions | None:
+        """Read two states of a layout."""
+        before, after, *blocks = (
+            None
+            if (layer := input_of(self.algorithm.spec, kind)) is None
+            # the numbers of blocks and all other columns belong to parcels
+            else self._features(layer, None if layer.required else ())
+            for kind in (
+                item.kind,
+                InputKind.PARCELS_AFTER,
+                InputKind.BLOCKS_BEFORE,
+                InputKind.BLOCKS_AFTER,
+            )
+        )
+        if before is None or after is None:
+            return None
+        self.name = self.name or after.name
+        return build_editions(
+            EditionLayers(before, blocks[0]),
+            EditionLayers(after, blocks[1]),
+            library=QgisCrs(self.context.transformContext()),
+        )
+
+    def _features(
+        self, item: Input, wanted: Sequence[str] | None = GIVEN_COLUMNS
+    ) -> Features[QgsCoordinateReferenceSystem] | None:
         """Read a layer, or the features of it that are selected; None where none is given."""
         name = parameter_name(item.name)
         source = self.algorithm.parameterAsSource(self.parameters, name, self.context)
@@ -150,7 +241,7 @@ class Sources:
                 )
             return None
         known = source.fields().names()
-        columns = [column for column in GIVEN_COLUMNS if column in known]
+        columns = known if wanted is None else [name for name in wanted if name in known]
         rows = self._rows(source, name, columns)
         return Features(
             _objects([geometry for geometry, _ in rows]),
@@ -210,7 +301,9 @@ def _objects(values: Sequence[Any]) -> npt.NDArray[np.object_]:
 
 def _plain(value: Any) -> Any:
     """Return an attribute's value, None where QGIS has NULL."""
-    return None if value == NULL else value
+    if value == NULL:
+        return None
+    return value.toString(Qt.DateFormat.ISODate) if isinstance(value, _TIMES) else value
 
 
 def _shapely(geometry: QgsGeometry) -> shapely.Geometry | None:

@@ -16,35 +16,54 @@ from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from urban_processing import errors
-    from urban_processing.api import cogenerate, optimize
+    from urban_processing.api import cogenerate, find_blocks, optimize, subdivide, transfer
     from urban_processing.io.files import read_layout
-    from urban_processing.io.frames import GeoLayout
+    from urban_processing.io.frames import GeoLayers, GeoLayout
+    from urban_processing.params.blocks import BlocksParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
     from urban_processing.params.optimize import OptimizeParams
     from urban_processing.params.rules import Preset
+    from urban_processing.params.subdivide import Strategy, SubdivideParams
+    from urban_processing.params.transfer import TransferParams
 
 _HOME = {
+    "BlocksParams": "urban_processing.params.blocks",
     "CogenerateParams": "urban_processing.params.cogenerate",
+    "GeoLayers": "urban_processing.io.frames",
     "GeoLayout": "urban_processing.io.frames",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
+    "Strategy": "urban_processing.params.subdivide",
     "StreetPattern": "urban_processing.params.cogenerate",
+    "SubdivideParams": "urban_processing.params.subdivide",
+    "TransferParams": "urban_processing.params.transfer",
     "cogenerate": "urban_processing.api",
+    "find_blocks": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
+    "subdivide": "urban_processing.api",
+    "transfer": "urban_processing.api",
 }
 
 __all__ = [
+    "BlocksParams",
     "CogenerateParams",
+    "GeoLayers",
     "GeoLayout",
     "OptimizeParams",
     "Preset",
+    "Strategy",
     "StreetPattern",
+    "SubdivideParams",
+    "TransferParams",
     "__version__",
     "cogenerate",
     "errors",
+    "find_blocks",
     "optimize",
     "read_layout",
+    "subdivide",
+    "transfer",
 ]
 
 

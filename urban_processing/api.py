@@ -8,19 +8,33 @@ from typing import Any
 
 import numpy.typing as npt
 
+from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
+from urban_processing.io.blocks import read_blocks, read_streets
 from urban_processing.io.boundaries import read_boundary
+from urban_processing.io.editions import read_editions
 from urban_processing.io.features import Source
-from urban_processing.io.files import read_layout
-from urban_processing.io.frames import GeoLayout
+from urban_processing.io.files import read_layout, read_subdivision
+from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.layouts import read_layers
 from urban_processing.layout import Layout
+from urban_processing.layout_file.subdivisions import previous_of
+from urban_processing.metrics.subdivisions import MeasuredSubdivision
+from urban_processing.params.blocks import BlocksParams
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.params.subdivide import SubdivideParams
+from urban_processing.params.transfer import TransferParams
+from urban_processing.parcelling.reuse import Previous
+from urban_processing.pipelines import blocks as block_finding
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
+from urban_processing.pipelines import subdivide as subdivision
+from urban_processing.pipelines import transfer as persistence
 from urban_processing.pipelines.ground import given_layers
+from urban_processing.processes import process_pool
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
+from urban_processing.schema import BLOCK_EDGES, BLOCKS
 from urban_processing.site import Site
 
 
@@ -158,6 +172,228 @@ def optimize(
     params = OptimizeParams.from_values(parameters)
     given = _layout(layout, parcels, streets, params)
     return GeoLayout(optimization.optimize(given, params, progress))
+
+
+def find_blocks(
+    streets: Source | StreetsOnLand,
+    *,
+    land: Source | None = None,
+    layer: str | None = None,
+    where: str | None = None,
+    crs: object = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Find the blocks between streets, less the land that the streets take.
+
+    Parameters
+    ----------
+    streets
+        Centrelines: a file, GeoDataFrame, GeoSeries or shapely lines; their columns may say width,
+        class and name.
+    land, layer, where, crs
+        As in `urban_processing.io.blocks.read_streets`.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `BlocksParams`.
+
+    Returns
+    -------
+    GeoLayers
+        ``blocks``, ``block_edges`` with the streets along them, ``right_of_way`` and ``issues``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong; an `UrbanError` where both streets and parameters are.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling. Section 3.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> streets = [shapely.box(0, 0, 90, 60).exterior, shapely.LineString([(40, 0), (40, 60)])]
+    >>> found = find_blocks(streets, default_width=10)
+    >>> found.blocks.area_m2.tolist()
+    [1500.0, 2000.0]
+    """
+    errors: list[UrbanError] = []
+    params, ground = None, None
+    try:
+        params = BlocksParams.from_values(parameters)
+    except ParameterError as error:
+        errors.append(error)
+    try:
+        ground = _streets(streets, land=land, layer=layer, where=where, crs=crs)
+    except BoundaryError as error:
+        errors.append(error)
+    if params is None or ground is None:
+        raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
+    return GeoLayers(block_finding.blocks(ground, params, progress))
+
+
+def subdivide(
+    blocks: Source | GeoLayers,
+    *,
+    streets: Source | None = None,
+    layer: str | None = None,
+    where: str | None = None,
+    crs: object = None,
+    previous: GeoLayers | str | PathLike[str] | None = None,
+    processes: int = 1,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Divide blocks into parcels, each block for itself.
+
+    Parameters
+    ----------
+    blocks
+        Polygons: a file, GeoDataFrame, GeoSeries or shapely polygons, or what `find_blocks` made;
+        columns with the names of parameters set these block by block.
+    streets, layer, where, crs
+        As in `urban_processing.io.blocks.read_blocks`.
+    previous
+        A subdivision made before, or its file: blocks in which nothing has changed keep their
+        parcels, and all parcels their numbers as far as they are the same.
+    processes
+        Number of processes that work side by side; the result is the same.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `SubdivideParams`.
+
+    Returns
+    -------
+    GeoLayers
+        ``parcels``, ``blocks`` and ``issues``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong; an `UrbanError` where both blocks and parameters are.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> made = subdivide(shapely.box(0, 0, 90, 60), min_area=600, irregularity=0)
+    >>> made.parcels.area_m2.tolist()
+    [900.0, 900.0, 900.0, 900.0, 900.0, 900.0]
+    """
+    errors: list[UrbanError] = []
+    params, ground, before = None, None, None
+    try:
+        params = SubdivideParams.from_values(parameters)
+    except ParameterError as error:
+        errors.append(error)
+    if isinstance(blocks, GeoLayers):
+        if streets is None and BLOCK_EDGES.name in blocks.made.names:
+            streets = blocks.frame(BLOCK_EDGES.name)
+        blocks = blocks.frame(BLOCKS.name)
+    try:
+        ground = read_blocks(
+            blocks, streets=streets, layer=layer, where=where, crs=crs, params=params
+        )
+    except BoundaryError as error:
+        errors.append(error)
+    try:
+        before = _previous(previous)
+    except BoundaryError as error:
+        errors.append(error)
+    if errors or params is None or ground is None:
+        raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
+    if processes == 1:
+        made = subdivision.subdivide(ground, params, progress, previous=before)
+    else:
+        with process_pool(processes) as executor:
+            made = subdivision.subdivide(
+                ground, params, progress, previous=before, executor=executor
+            )
+    return GeoLayers(MeasuredSubdivision(made).layers())
+
+
+def _previous(given: GeoLayers | str | PathLike[str] | None) -> Previous | None:
+    if given is None:
+        return None
+    return previous_of(given.made) if isinstance(given, GeoLayers) else read_subdivision(given)
+
+
+def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
+    if not isinstance(source, StreetsOnLand):
+        return read_streets(source, **options)
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise BoundaryError(f"Streets are ready as they are: leave out {', '.join(given)}.")
+    return source
+
+
+def transfer(
+    before: Source | GeoLayout,
+    after: Source | GeoLayout,
+    *,
+    blocks_before: Source | None = None,
+    blocks_after: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Give the parcels after an edit the numbers and columns of the same parcels before it.
+
+    Positions relative to the corners of blocks say which parcel is which (Vanegas 2012,
+    section 5). Numbers stay unique; new ones are above all old ones.
+
+    Parameters
+    ----------
+    before, after
+        Parcels: files, GeoDataFrames or geometries; or layouts, also as files: then their
+        streets say what a block is.
+    blocks_before, blocks_after
+        Polygons of blocks, or lines around them, likewise.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `TransferParams`.
+
+    Returns
+    -------
+    GeoLayers
+        The layers ``parcels`` and ``changes``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> before = [shapely.box(x, 0, x + 20, 30) for x in (0, 20, 40)]
+    >>> after = [shapely.box(x, 0, x + 22, 30) for x in (44, 0, 22)]
+    >>> made = transfer(before, after)
+    >>> made.parcels.parcel_id.tolist(), made.parcels.change.tolist()
+    ([1, 2, 3], ['moved', 'moved', 'moved'])
+    """
+    params = TransferParams.from_values(parameters)
+    old, new = _state(before, blocks_before), _state(after, blocks_after)
+    editions = read_editions(old[0], new[0], old[1], new[1])
+    return GeoLayers(persistence.transfer(editions, params, progress))
+
+
+def _state(parcels: Source | GeoLayout, blocks: Source | None) -> tuple[Source, Source | None]:
+    """Return parcels, and blocks or the streets between them where they are known."""
+    if not isinstance(parcels, GeoLayout):
+        return parcels, blocks
+    return parcels.parcels, parcels.streets if blocks is None else blocks
 
 
 def _layout(

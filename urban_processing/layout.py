@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -20,6 +20,7 @@ from urban_processing.mesh.corner_graph import CornerGraph, build_corner_graph
 from urban_processing.mesh.edit import Remap
 from urban_processing.mesh.places import are_near
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
+from urban_processing.provenance import Step
 from urban_processing.site import Frame, Issue
 from urban_processing.street_rules import StreetRules
 
@@ -36,19 +37,6 @@ class EdgeKind(enum.IntEnum):
 
 ON_OBSTACLE = 1e-5
 """An edge of the rim within this many metres of an obstacle is on it: vertices are rounded."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One entry of a layout's provenance; `results` are figures that the step has to tell."""
-
-    algorithm: str
-    parameters: Mapping[str, Any]
-    seed: int
-    version: str
-    input_sha256: str
-    seconds: float
-    results: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclass(frozen=True)

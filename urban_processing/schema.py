@@ -77,6 +77,9 @@ class Layer:
         Readable name.
     shown
         Whether a toolbox that makes single layers makes this one unless told otherwise.
+    open
+        Whether columns that somebody gave may follow: then the layer made is another `Layer` of
+        the same name.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Layer:
     columns: tuple[Column, ...]
     title: str
     shown: bool = False
+    open: bool = False
 
     @property
     def column_names(self) -> tuple[str, ...]:
@@ -116,7 +120,8 @@ def _boolean(name: str, alias: str, description: str) -> Column:
     return Column(name, ColumnType.BOOLEAN, "", description, alias)
 
 
-_PART = _integer("part", "Part", "Connected piece of the land, counted from 0, largest first.")
+PART = _integer("part", "Part", "Connected piece of the land, counted from 0, largest first.")
+BLOCK_ID = _integer("block_id", "Block", "Number of the block.")
 _PART_OR_ALL = _integer(
     "part", "Part", "Connected piece of the land; empty where the whole is meant.", nullable=True
 )
@@ -128,7 +133,7 @@ PARCELS = Layer(
     GeometryType.POLYGON,
     (
         _PARCEL_ID,
-        _PART,
+        PART,
         _integer("level", "Level", "Number of cuts that made the parcel out of its part."),
         _AREA,
         _real(
@@ -203,7 +208,7 @@ STREETS = Layer(
     (
         _integer("edge_id", "Edge", "Number of the network edge, counted from 1."),
         _integer("street_id", "Street", "Number of the street that the edge belongs to."),
-        _PART,
+        PART,
         _text(
             "class",
             "Class",
@@ -236,7 +241,7 @@ JUNCTIONS = Layer(
     GeometryType.POINT,
     (
         _integer("junction_id", "Junction", "Number of the junction or end, counted from 1."),
-        _PART,
+        PART,
         _text("kind", "Kind", "junction, end or entry."),
         _integer("degree", "Degree", "Number of street edges that meet."),
         _real(
@@ -254,30 +259,80 @@ JUNCTIONS = Layer(
 BOUNDARY = Layer(
     "boundary",
     GeometryType.POLYGON,
-    (_PART, _AREA),
+    (PART, _AREA),
     "Land that was laid out",
 )
 
-INPUT_BOUNDARY = Layer("input_boundary", GeometryType.POLYGON, (_PART, _AREA), "Boundary as given")
+INPUT_BOUNDARY = Layer("input_boundary", GeometryType.POLYGON, (PART, _AREA), "Boundary as given")
 
-OBSTACLES = Layer("obstacles", GeometryType.POLYGON, (_PART, _AREA), "Obstacles")
+OBSTACLES = Layer("obstacles", GeometryType.POLYGON, (PART, _AREA), "Obstacles")
 
-_TRUE_AREA = _real("area_m2", "Area", "Area.", unit="m²")
+TRUE_AREA = _real("area_m2", "Area", "Area.", unit="m²")
 
 RIGHT_OF_WAY = Layer(
     "right_of_way",
     GeometryType.POLYGON,
     (
-        _text("class", "Class", "Class of its streets: rim, fixed, collector, local, cul_de_sac."),
-        _PART,
-        _TRUE_AREA,
+        _text(
+            "class",
+            "Class",
+            "Class of its streets: rim, fixed, collector, local, cul_de_sac, or one given.",
+        ),
+        PART,
+        TRUE_AREA,
     ),
     "Right-of-way",
 )
 
 NET_PARCELS = Layer(
-    "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, _PART, _TRUE_AREA), "Net parcels"
+    "net_parcels", GeometryType.POLYGON, (_PARCEL_ID, PART, TRUE_AREA), "Net parcels"
 )
+
+_STREET_ID = _integer(
+    "street_id",
+    "Street",
+    "Number of the street along it: that given, or streets of one name or in one line.",
+    nullable=True,
+)
+
+BLOCKS = Layer(
+    "blocks",
+    GeometryType.POLYGON,
+    (
+        BLOCK_ID,
+        PART,
+        TRUE_AREA,
+        _real("perimeter_m", "Perimeter", "Length of all its edges.", unit="m"),
+        _real("frontage_m", "Frontage", "Length of its edges on streets.", unit="m"),
+        _integer("streets", "Streets", "Number of streets around it."),
+    ),
+    "Blocks",
+    shown=True,
+)
+"""Land between streets, net of rights-of-way."""
+
+BLOCK_EDGES = Layer(
+    "block_edges",
+    GeometryType.LINE,
+    (
+        BLOCK_ID,
+        PART,
+        _STREET_ID,
+        _text("class", "Class", "Class of the street; empty where there is none.", nullable=True),
+        _real(
+            "width_m",
+            "Width",
+            "Width of the right-of-way of the street; empty where there is none.",
+            unit="m",
+            nullable=True,
+        ),
+        _real("length_m", "Length", "Length of the edge.", unit="m"),
+        _boolean("access", "Access", "Whether a street lies along it."),
+    ),
+    "Edges of blocks",
+    shown=True,
+)
+"""Edges of blocks with the street along them; those that follow one another on one are one."""
 
 ISSUES = Layer(
     "issues",

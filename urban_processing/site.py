@@ -13,6 +13,12 @@ GRID = 2.0**-20
 """Spacing in metres of the grid that all coordinates are kept on, relative to a whole-metre
 origin, so that shifting to map coordinates and back loses nothing."""
 
+FINE_GRID = 2.0**-28
+"""Spacing in metres of the grid that points added by subdivision are kept on. On the grid of all
+other coordinates, 256 times as coarse, a point on the edge of a block would lie so far beside
+it that areas of a small block's parcels no longer add up to 1e-9 of its own. Coordinates on
+it, too, are shifted to the map and back without loss."""
+
 AREA_ROUNDING = 1e-9
 """Share by which rounding may take an area below the smallest one allowed."""
 

@@ -63,3 +63,53 @@ class StreetRules:
         """Return the rules that `as_dict` gave; what is not there is as by default."""
         known = {field.name for field in dataclasses.fields(cls)}
         return cls(**{name: value for name, value in values.items() if name in known})
+
+
+CLASS_WIDTHS: Mapping[str, float] = MappingProxyType(
+    {
+        "motorway": 40.0,
+        "trunk": 32.0,
+        "primary": 24.0,
+        "secondary": 20.0,
+        "tertiary": 16.0,
+        "motorway_link": 12.0,
+        "trunk_link": 12.0,
+        "primary_link": 12.0,
+        "secondary_link": 12.0,
+        "tertiary_link": 12.0,
+        "busway": 12.0,
+        **StreetRules().width_m,
+        "unclassified": 12.0,
+        "residential": 12.0,
+        "road": 12.0,
+        "living_street": 9.0,
+        "service": 8.0,
+        "track": 6.0,
+        "pedestrian": 8.0,
+        "cycleway": 4.0,
+        "bridleway": 4.0,
+        "footway": 3.0,
+        "path": 3.0,
+        "steps": 3.0,
+    }
+)
+"""Width in metres of the right-of-way by class, from the highest class to the lowest: those of
+layouts and the values of OpenStreetMap's ``highway``."""
+
+FOOTPATHS: frozenset[str] = frozenset({"cycleway", "bridleway", "footway", "path", "steps"})
+"""Classes that no vehicle uses: no parcel is reached by them alone."""
+
+NO_STREETS: frozenset[str] = frozenset(
+    {
+        "abandoned", "bus_guideway", "bus_stop", "construction", "corridor", "crossing",
+        "disused", "elevator", "emergency_bay", "escape", "planned", "platform", "proposed",
+        "raceway", "razed", "rest_area", "services", "street_lamp",
+    }
+)  # fmt: skip
+"""Values of ``highway`` that are no streets."""
+
+VERGES = 6.0
+"""Metres that pavements and verges add to the carriageway of OpenStreetMap's ``width``."""
+
+LANE_WIDTH = 3.25
+"""Metres of carriageway that one of OpenStreetMap's ``lanes`` takes."""

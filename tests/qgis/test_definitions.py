@@ -20,11 +20,10 @@ from qgis.core import (
     QgsProcessingParameterNumber,
 )
 
-from urban_processing.algorithms import AlgorithmSpec, InputKind, OutputKind, specs
+from urban_processing.algorithms import AlgorithmSpec, InputKind, specs
 from urban_processing.algorithms.json_schema import description
 from urban_processing.cli.options import command_parameters
 from urban_processing.params import ParamField
-from urban_processing.schema import LAID_OUT
 
 FREE = 1e300
 """QGIS's own limits of a number without limits lie beyond this, or at the ends of 32 bits."""
@@ -33,6 +32,7 @@ SHELL_ONLY = {
     "cli": {
         *("place", "layer", "where"),  # QGIS has layers, filters and selections
         *("overwrite", "record_seconds", "export", "export_format", "quiet"),
+        "processes",  # the program that runs QGIS is not Python
     },
     "qgis": set[str](),
 }
@@ -60,7 +60,7 @@ def test_texts_are_those_of_the_declaration(algorithm: Any, spec: AlgorithmSpec)
     for source in spec.references:
         assert source in algorithm.shortHelpString()
     assert not algorithm.icon().isNull()
-    assert "parcels" in algorithm.tags()
+    assert {spec.name, "planning"} <= set(algorithm.tags())
 
 
 def test_names_are_those_of_the_command_line(algorithm: Any, spec: AlgorithmSpec) -> None:
@@ -72,8 +72,7 @@ def test_names_are_those_of_the_command_line(algorithm: Any, spec: AlgorithmSpec
     }
     asked = {d.name().lower() for d in algorithm.parameterDefinitions()} - sinks
     assert asked - SHELL_ONLY["qgis"] == options
-    layouts = [o.name for o in spec.outputs if o.kind is OutputKind.LAYOUT]
-    assert sinks == {f"{name}_{layer.name}" for name in layouts for layer in LAID_OUT}
+    assert sinks == {f"{o.name}_{layer.name}" for o in spec.outputs for layer in o.layers}
 
 
 def test_defaults_limits_and_helps_are_those_of_the_declaration(
@@ -124,6 +123,14 @@ INPUTS = {
     InputKind.ENTRY_POINTS: QgsProcessing.SourceType.TypeVectorPoint,
     InputKind.PARCEL_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.STREET_LAYER: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.CENTRELINES: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
 }
 
 
@@ -133,7 +140,7 @@ def test_inputs_are_layers_of_the_right_kind(algorithm: Any, spec: AlgorithmSpec
         asked = algorithm.parameterDefinition(item.name.upper())
         assert bool(asked.flags() & optional) is not item.required
         assert asked.description() == item.label
-        if item.kind is InputKind.LAYOUT:
+        if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION):
             assert isinstance(asked, QgsProcessingParameterFile)
         else:
             assert isinstance(asked, QgsProcessingParameterFeatureSource)
@@ -150,14 +157,13 @@ def test_what_must_be_given_stands_at_the_top(provider: Any) -> None:
     assert names[:3] == ["LAYOUT", "PARCEL_LAYER", "STREET_LAYER"]
 
 
-def test_results_are_sinks_and_files_and_all_optional(algorithm: Any) -> None:
+def test_results_are_sinks_and_files_and_all_optional(algorithm: Any, spec: AlgorithmSpec) -> None:
     made = {d.name(): d for d in algorithm.destinationParameterDefinitions()}
     optional = QgsProcessingParameterDefinition.Flag.FlagOptional
     assert all(bool(d.flags() & optional) for d in made.values())
     by_default = {name for name, d in made.items() if d.createByDefault()}
-    assert by_default == {
-        f"OUTPUT_{name}" for name in ("PARCELS", "STREETS", "JUNCTIONS", "ISSUES")
-    }
+    shown = {f"{o.name}_{layer.name}" for o in spec.outputs for layer in o.layers if layer.shown}
+    assert by_default == {name.upper() for name in shown}
     files = {n for n, d in made.items() if isinstance(d, QgsProcessingParameterFileDestination)}
     assert files == {"OUTPUT", "PLOT"}
     assert made["OUTPUT"].defaultFileExtension() == "gpkg"

@@ -167,7 +167,11 @@ def another(provider: Any, engine: Callable[[str], Any]) -> Iterator[Any]:
         ),
         outputs=(
             spec.Output(
-                name="output", kind=spec.OutputKind.LAYOUT, label="Layout file", help="A file."
+                name="output",
+                kind=spec.OutputKind.LAYOUT,
+                label="Layout file",
+                help="A file.",
+                layers=engine("engine.schema").LAID_OUT,
             ),
         ),
         run=rerun,

@@ -38,6 +38,7 @@ from urban_processing.layout import Layout
 from urban_processing.params import CogenerateParams, option_name
 from urban_processing.pipelines.cogenerate import Estimate
 from urban_processing.progress import MANY_PARCELS, Progress
+from urban_processing.schema import LAID_OUT
 
 CRS = "EPSG:32632"
 LAND = shapely.box(500_000, 5_200_000, 500_160, 5_200_100)
@@ -546,6 +547,7 @@ def test_a_spec_that_goes_on_from_a_layout_needs_no_new_code(land: Path, tmp_pat
             Output(
                 name="output",
                 kind=OutputKind.LAYOUT,
+                layers=LAID_OUT,
                 label="Layout",
                 help="The layout.",
                 required=True,

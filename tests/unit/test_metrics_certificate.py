@@ -11,14 +11,9 @@ from grid_layouts import boxes, cut_square, grid, layout_of, with_streets
 
 from urban_processing.layout import Layout
 from urban_processing.metrics.certificate import Certificate, certificate, certify
-from urban_processing.metrics.tables import (
-    Table,
-    boundary_table,
-    issue_table,
-    parcel_table,
-    street_table,
-)
+from urban_processing.metrics.tables import boundary_table, parcel_table, street_table
 from urban_processing.site import Issue
+from urban_processing.tables import Table, issue_table
 
 ORIGIN = (500_000.0, 5_700_000.0)
 
@@ -192,7 +187,7 @@ def test_tables_are_certified_without_the_layout() -> None:
         streets,
         boundary,
         min_area=400.0,
-        issues=issue_table(layout),
+        issues=issue_table(layout.issues, layout.frame),
     )
     assert result.holds
     with pytest.raises(ValueError, match="without geometry"):

@@ -11,9 +11,10 @@ import shapely
 from grid_layouts import SIDE, boxes, cut_square, grid, layout_of
 
 from urban_processing import graphs
-from urban_processing.layout import Layout, Step
+from urban_processing.layout import Layout
 from urban_processing.metrics.measures import measure
 from urban_processing.metrics.registry import INTERIOR, METRICS
+from urban_processing.provenance import Step
 
 
 def values(layout: Layout, part: int | None = None) -> dict[str, float]:

@@ -9,20 +9,18 @@ import pytest
 import shapely
 from grid_layouts import SIDE, boxes, grid, layout_of
 
-from urban_processing.layout import Step
 from urban_processing.metrics.tables import (
-    Table,
     boundary_table,
-    issue_table,
     junction_table,
     layout_tables,
     parcel_table,
-    provenance_table,
     street_table,
 )
+from urban_processing.provenance import Step
 from urban_processing.schema import LAID_OUT, LAYERS, OBSTACLES, ColumnType, GeometryType, layer
 from urban_processing.site import Issue
 from urban_processing.street_rules import StreetRules
+from urban_processing.tables import Table, issue_table, provenance_table
 
 ORIGIN = (500_000.0, 5_700_000.0)
 
@@ -147,7 +145,7 @@ def test_issues_keep_their_gaps() -> None:
         Issue("a", "One.", part=1, parcel_id=4, value=2.0, limit=3.0, geometry=shapely.Point(1, 2)),
         Issue("b", "Two."),
     )
-    table = issue_table(grid(2, 2, origin=ORIGIN).replace(issues=issues))
+    table = issue_table(issues, grid(2, 2, origin=ORIGIN).frame)
     assert table["part"][0] == 1
     assert np.isnan(table["part"][1])
     assert np.isnan(table["parcel_id"][1])
@@ -159,7 +157,7 @@ def test_issues_keep_their_gaps() -> None:
 
 def test_provenance_is_json() -> None:
     step = Step("cogenerate", {"min_area": 400.0, "orientation": None}, 7, "1.0", "ab", 0.5)
-    table = provenance_table(grid(2, 2).replace(history=(step, step)))
+    table = provenance_table((step, step))
     assert table["step"].tolist() == [1, 2]
     assert json.loads(table["parameters"][0]) == {"min_area": 400.0, "orientation": None}
 

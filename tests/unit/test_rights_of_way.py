@@ -20,9 +20,7 @@ from urban_processing.layout import Layout
 from urban_processing.metrics import LayoutMeasures, certificate, layout_tables, measure
 from urban_processing.metrics.certificate import certify
 from urban_processing.metrics.tables import (
-    Table,
     boundary_table,
-    issue_table,
     net_parcel_table,
     parcel_table,
     right_of_way_table,
@@ -38,6 +36,7 @@ from urban_processing.rights_of_way import (
 )
 from urban_processing.rights_of_way.lay_out import CLASSES
 from urban_processing.street_rules import StreetClass, StreetRules
+from urban_processing.tables import Table, issue_table
 
 ARC = 0.03
 """Share of a fillet that its straight segments may differ from a true arc."""
@@ -286,7 +285,7 @@ def certified(layout: Layout, right_of_way: Table, net_parcels: Table) -> set[st
         street_table(layout),
         boundary_table(layout),
         min_area=layout.min_area,
-        issues=issue_table(layout),
+        issues=issue_table(layout.issues, layout.frame),
         right_of_way=right_of_way,
         net_parcels=net_parcels,
         net_min_area=layout.street_rules.net_min_area,

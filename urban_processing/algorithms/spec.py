@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
-from urban_processing.progress import Progress
+from urban_processing.schema import Layer
 
 
 class InputKind(enum.StrEnum):
@@ -40,11 +40,41 @@ class InputKind(enum.StrEnum):
     over in its place."""
     STREET_LAYER = "street layer"
     """Lines of streets that belong to a layer of parcels."""
+    PARCELS_BEFORE = "parcels before an edit"
+    """Polygons of parcels with all their columns; handed over with the three that follow, as
+    `Editions`."""
+    PARCELS_AFTER = "parcels after an edit"
+    """Polygons of parcels with all their columns."""
+    BLOCKS_BEFORE = "blocks before an edit"
+    """Polygons of blocks, or lines around them."""
+    BLOCKS_AFTER = "blocks after an edit"
+    """Polygons of blocks, or lines around them."""
+
+    CENTRELINES = "centrelines of streets"
+    """Lines of streets that blocks are found between; handed over as `StreetsOnLand`."""
+    LAND = "polygons of land"
+    """Land that these blocks are cut at; a part of the `StreetsOnLand`."""
+    BLOCK_LAYER = "block layer"
+    """Polygons of blocks; handed over as `Blocks`."""
+    BLOCK_STREETS = "lines of streets along blocks"
+    """Streets that belong to a layer of blocks."""
+    SUBDIVISION = "subdivision"
+    """A subdivision made before, as a file; handed over as `Previous`."""
 
     @property
     def of_site(self) -> str:
         """Name of the argument of `read_boundary` that takes such an input; empty for others."""
         return _OF_SITE.get(self, "")
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether such an input is what the work is done on: it has a frame, and issues."""
+        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
+
+    @property
+    def chooses_crs(self) -> bool:
+        """Whether the user may choose the CRS in which such an input is worked on."""
+        return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
 
 
 _OF_SITE = {
@@ -62,10 +92,17 @@ class OutputKind(enum.StrEnum):
 
     LAYOUT = "layout"
     """A `Layout`: a GeoPackage on the command line, sinks in QGIS."""
+    LAYERS = "layers"
+    """A `LayerSet` of the layers in `Output.layers`; stored as a layout is."""
     MAP = "map"
-    """A picture of the layout named in `Output.of`."""
+    """A picture of the layout or layers named in `Output.of`."""
     EXPORT = "export"
-    """A folder of plain files, one for each layer of the layout named in `Output.of`."""
+    """A folder of plain files, one for each layer of what is named in `Output.of`."""
+
+    @property
+    def is_geopackage(self) -> bool:
+        """Whether it is stored as one file with several layers."""
+        return self in (OutputKind.LAYOUT, OutputKind.LAYERS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +149,8 @@ class Output:
     of
         Name of the output that this one is another view of, as a map is of a layout; the
         shell makes it, the algorithm does not.
+    layers
+        Layers that a layout or a set of layers can have.
     """
 
     name: str
@@ -120,6 +159,7 @@ class Output:
     help: str
     required: bool = False
     of: str = ""
+    layers: tuple[Layer, ...] = ()
 
 
 class Estimate(Protocol):
@@ -161,6 +201,8 @@ class AlgorithmSpec:
         when it is called, so that a list of algorithms costs nothing.
     estimate
         ``estimate(inputs, params)``, where a run may be long.
+    parallel
+        Whether `run` takes a keyword ``executor`` that runs parts of the work side by side.
     references
         The sources, as a reader would look them up.
     examples
@@ -175,8 +217,9 @@ class AlgorithmSpec:
     params: type[Params]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    run: Callable[[Mapping[str, Any], Any, Progress], Mapping[str, Any]]
+    run: Callable[..., Mapping[str, Any]]
     estimate: Callable[[Mapping[str, Any], Any], Estimate] | None = None
+    parallel: bool = False
     references: tuple[str, ...] = ()
     examples: tuple[str, ...] = ()
 
@@ -187,6 +230,9 @@ class AlgorithmSpec:
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
         made = {output.name for output in self.outputs if not output.of}
+        bare = [o.name for o in self.outputs if o.kind.is_geopackage != bool(o.layers)]
+        if bare:
+            raise ValueError(f"{self.name}: layers belong to GeoPackages: {', '.join(bare)}")
         lost = [output.name for output in self.outputs if output.of and output.of not in made]
         if lost:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")

@@ -107,10 +107,25 @@ class BlockRings:
         after[self.offsets[1:] - 1] = self.offsets[:-1]
         return after
 
+    def of(self, rows: IntArray) -> tuple[BlockRings, IntArray]:
+        """Return the rings of some polygons, in that order, and their edges in this one."""
+        rings = ragged_rows(np.searchsorted(self.block, np.arange(self.block[-1] + 2)), rows)
+        edges = ragged_rows(self.offsets, rings)
+        size = np.diff(self.offsets)[rings]
+        block = np.repeat(np.arange(len(rows)), np.bincount(self.block)[rows])
+        return BlockRings(self.xy[edges], np.append(0, np.cumsum(size)), block), edges
+
     @property
     def is_shell(self) -> BoolArray:
         """(R,) rings that are shells."""
         return np.asarray(np.diff(self.block, prepend=-1) != 0)
+
+
+def ragged_rows(offsets: IntArray, rows: IntArray) -> IntArray:
+    """Return the places of the elements of some rows of a ragged array, row by row."""
+    size = np.diff(offsets)[rows]
+    begin = np.append(0, np.cumsum(size))
+    return np.asarray(np.arange(begin[-1]) + np.repeat(offsets[rows] - begin[:-1], size))
 
 
 def rings_of(polygons: npt.NDArray[np.object_]) -> BlockRings:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from urban_processing.algorithms.choices import layout_problems
-from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
+from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output
 from urban_processing.cli import stores
 from urban_processing.errors import BoundaryError, UrbanError
 from urban_processing.params.base import Params, option_name
+from urban_processing.params.subdivide import SubdivideParams
+
+P = TypeVar("P", bound=Params)
 
 
 class BadCallError(UrbanError):
@@ -26,6 +29,10 @@ class Call:
     params: Params
 
 
+_Reader = Callable[[AlgorithmSpec, Input, Mapping[str, Any], list[str]], Any]
+"""Reads an input from what was given; adds to the list what is wrong with it."""
+
+
 def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
     """Check everything, read the inputs, and report all the mistakes of the call together.
 
@@ -36,17 +43,14 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
     DependencyError
         If a place cannot be looked up.
     """
-    names = [field.name for field in spec.params.fields()]
-    values = {name: given[name] for name in names if given[name] is not None}
+    values = _values(spec, given)
     layers = [i.name for i in spec.inputs if i.kind.of_site and given[i.name] is not None]
     problems = spec.params.problems_with(values, layers=layers)
     problems += _output_problems(spec, given)
     inputs: dict[str, Any] = {}
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY:
-            inputs[item.name] = _read_boundary(spec, item, given, problems)
-        elif item.kind is InputKind.LAYOUT:
-            inputs[item.name] = _read_layout(spec, item, given, problems)
+        if item.kind in _READERS:
+            inputs[item.name] = _READERS[item.kind](spec, item, given, problems)
     if problems:
         raise BadCallError(problems)
     return Call(inputs, spec.params.from_values(values))
@@ -89,6 +93,27 @@ def _read_layout(
             for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER)
         )
         return read_layers(parcels, streets, snap=snap or 0.0)
+    except UrbanError as error:
+        problems += error.problems
+        return None
+
+
+def _read_editions(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read the two states of a layout; None where one was not given or is added to `problems`."""
+    del item
+    by_kind = {i.kind: given[i.name] for i in spec.inputs}
+    missing = [
+        i for i in spec.inputs if i.required and given[i.name] is None and i.kind in _EDITIONS
+    ]
+    problems += [f"Give {option_name(i.name).upper()}, {_lower_first(i.help)}" for i in missing]
+    if missing:
+        return None
+    from urban_processing.io.editions import read_editions
+
+    try:
+        return read_editions(*(by_kind[kind] for kind in _EDITIONS))
     except UrbanError as error:
         problems += error.problems
         return None
@@ -142,6 +167,98 @@ def _boundary(
     )
 
 
+def _read_centrelines(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read streets and the land they are on; None where that failed."""
+    if given[item.name] is None:
+        problems.append(f"Give {option_name(item.name).upper()}, a file with lines of streets.")
+        return None
+    from urban_processing.io.blocks import read_streets
+
+    land = next((given[i.name] for i in spec.inputs if i.kind is InputKind.LAND), None)
+    try:
+        return read_streets(
+            given[item.name],
+            land=land,
+            layer=given["layer"],
+            where=given["where"],
+            crs=given["crs"],
+        )
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _read_blocks(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read blocks and the streets along them; None where that failed."""
+    if given[item.name] is None:
+        problems.append(f"Give {option_name(item.name).upper()}, a file with polygons of blocks.")
+        return None
+    from urban_processing.io.blocks import read_blocks
+
+    streets = next((given[i.name] for i in spec.inputs if i.kind is InputKind.BLOCK_STREETS), None)
+    try:
+        return read_blocks(
+            given[item.name],
+            streets=streets,
+            layer=given["layer"],
+            where=given["where"],
+            crs=given["crs"],
+            params=_usable(SubdivideParams, _values(spec, given)),
+        )
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _read_subdivision(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read a subdivision made before; None where none is given or that failed."""
+    del spec
+    if given[item.name] is None:
+        return None
+    from urban_processing.io.files import read_subdivision
+
+    try:
+        return read_subdivision(given[item.name])
+    except BoundaryError as error:
+        problems += error.problems
+        return None
+
+
+def _usable(params: type[P], values: Mapping[str, Any]) -> P | None:
+    """The parameters that bounds in layers are checked against; None where they are wrong."""
+    return None if params.problems_with(values) else params.from_values(values)
+
+
+def _values(spec: AlgorithmSpec, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of the parameters that were given."""
+    names = [field.name for field in spec.params.fields()]
+    return {name: given[name] for name in names if given[name] is not None}
+
+
+_EDITIONS = (
+    InputKind.PARCELS_BEFORE,
+    InputKind.PARCELS_AFTER,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
+)
+
+_READERS: Mapping[InputKind, _Reader] = {
+    InputKind.BOUNDARY: _read_boundary,
+    InputKind.LAYOUT: _read_layout,
+    InputKind.CENTRELINES: _read_centrelines,
+    InputKind.BLOCK_LAYER: _read_blocks,
+    InputKind.SUBDIVISION: _read_subdivision,
+    InputKind.PARCELS_BEFORE: _read_editions,
+}
+"""What reads an input of a kind; inputs of other kinds are read together with one of these."""
+
+
 def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]:
     problems: list[str] = []
     taken = {
@@ -155,7 +272,8 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
             if output.required:
                 problems.append(f"Say where the result goes: {_flags(output)} FILE.")
             continue
-        problems += stores.problems(output, given)
+        whole = next(o for o in spec.outputs if o.name == (output.of or output.name))
+        problems += stores.problems(output, whole, given)
         place = Path(path).resolve()
         if place in taken:
             problems.append(
@@ -166,7 +284,7 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
 
 
 def _flags(output: Output) -> str:
-    return "-o" if output.kind is OutputKind.LAYOUT else f"--{option_name(output.name)}"
+    return "-o" if output.kind.is_geopackage else f"--{option_name(output.name)}"
 
 
 def _lower_first(sentence: str) -> str:

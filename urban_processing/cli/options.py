@@ -39,6 +39,19 @@ def command_parameters(spec: AlgorithmSpec) -> list[click.Parameter]:
     parameters += _writing_options(spec)
     for panel, fields in spec.panels().items():
         parameters += [parameter_option(field, panel) for field in fields]
+    if spec.parallel:
+        side_by_side = "Number of processes that work side by side; the result is the same."
+        parameters.append(
+            _option(
+                "--processes",
+                metavar="N",
+                type=click.IntRange(min=1),
+                default=1,
+                panel=OTHER,
+                help=side_by_side,
+                note="at least 1; default 1",
+            )
+        )
     quiet = "Say nothing but warnings and errors."
     parameters.append(_option("--quiet", "-q", is_flag=True, panel=OTHER, help=quiet))
     return parameters
@@ -86,8 +99,20 @@ def _file(*flags: str, metavar: str = "FILE", **kwargs: Any) -> PanelOption:
     return _option(*flags, type=click.Path(), metavar=metavar, **kwargs)
 
 
+_BY_OPTION = (
+    InputKind.PARCEL_LAYER,
+    InputKind.STREET_LAYER,
+    InputKind.BLOCK_STREETS,
+    InputKind.SUBDIVISION,
+    InputKind.LAND,
+    InputKind.BLOCKS_BEFORE,
+    InputKind.BLOCKS_AFTER,
+)
+"""Inputs that are options; the others are arguments."""
+
+
 def _input_parameters(item: Input) -> list[click.Parameter]:
-    if item.kind.of_site or item.kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
+    if item.kind.of_site or item.kind in _BY_OPTION:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
     argument = HelpArgument(
         [item.name],
@@ -96,13 +121,21 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
-    if item.kind is InputKind.LAYOUT:
+    if not item.kind.chooses_crs:
         return [argument]
+    if item.kind is not InputKind.BOUNDARY:
+        return [argument, *_choice_of_features()]
     place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
-    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
     return [
         argument,
         _option("--place", metavar="NAME", panel=INPUT, help=place),
+        *_choice_of_features(),
+    ]
+
+
+def _choice_of_features() -> list[click.Parameter]:
+    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
+    return [
         _option("--layer", metavar="NAME", panel=INPUT, help="Layer of a file that has several."),
         _option(
             "--where",
@@ -127,7 +160,7 @@ def _writing_options(spec: AlgorithmSpec) -> list[click.Parameter]:
     options: list[click.Parameter] = [
         _option("--overwrite", is_flag=True, panel=OUTPUT, help=replace)
     ]
-    if any(output.kind is OutputKind.LAYOUT for output in spec.outputs):
+    if any(output.kind.is_geopackage for output in spec.outputs):
         seconds = "Record how long the run took; the same seed then no longer gives the same bytes."
         options.append(_option("--record-seconds", is_flag=True, panel=OUTPUT, help=seconds))
     return options
@@ -135,7 +168,7 @@ def _writing_options(spec: AlgorithmSpec) -> list[click.Parameter]:
 
 def _output_options(output: Output) -> list[click.Parameter]:
     flag = f"--{option_name(output.name)}"
-    if output.kind is OutputKind.LAYOUT:
+    if output.kind.is_geopackage:
         return [_file("-o", flag, panel=OUTPUT, help=output.help, note=".gpkg")]
     if output.kind is OutputKind.MAP:
         return [_file(flag, panel=OUTPUT, help=output.help, note=".png, .svg or .pdf")]

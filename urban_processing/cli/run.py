@@ -9,7 +9,6 @@ from typing import Any
 from urban_processing.algorithms.spec import (
     AlgorithmSpec,
     Estimate,
-    InputKind,
     OutputKind,
 )
 from urban_processing.algorithms.words import duration_in_words, estimate_in_words
@@ -17,10 +16,11 @@ from urban_processing.cli import stores
 from urban_processing.cli.call import Call, prepare
 from urban_processing.cli.terminal import Terminal
 from urban_processing.errors import InfeasibleError
-from urban_processing.progress import MANY_PARCELS
+from urban_processing.progress import MANY_PARCELS, Progress
 
 _FILE_NAMES = {
     OutputKind.LAYOUT: "layout",
+    OutputKind.LAYERS: "layers",
     OutputKind.MAP: "picture",
     OutputKind.EXPORT: "export",
 }
@@ -43,7 +43,7 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
         _announce(spec.estimate(call.inputs, call.params), terminal)
     started = time.perf_counter()
     with terminal.progress(spec.title) as progress:
-        made = spec.run(call.inputs, call.params, progress)
+        made = _run(spec, call, progress, given)
     rows = [("time", duration_in_words(time.perf_counter() - started))]
     files = []
     for output in spec.outputs:
@@ -56,6 +56,8 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
             measured = MeasuredLayout(made[output.name])
             rows = [*measured.summary(), *rows]
             broken += [check.message for check in measured.certificate.failures]
+        elif output.kind is OutputKind.LAYERS:
+            rows = [*made[output.name].summary, *rows]
     terminal.table([*rows, *files])
     if broken:
         raise InfeasibleError(
@@ -63,10 +65,21 @@ def run_algorithm(spec: AlgorithmSpec, given: Mapping[str, Any], terminal: Termi
         )
 
 
+def _run(
+    spec: AlgorithmSpec, call: Call, progress: Progress, given: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    if not spec.parallel or given["processes"] == 1:
+        return spec.run(call.inputs, call.params, progress)
+    from urban_processing.processes import process_pool
+
+    with process_pool(given["processes"]) as executor:
+        return spec.run(call.inputs, call.params, progress, executor=executor)
+
+
 def _say_what_inputs_say(spec: AlgorithmSpec, call: Call, terminal: Terminal) -> None:
-    """Repeat on stderr what was repaired or changed in reading a boundary."""
+    """Repeat on stderr what was repaired or changed in reading the inputs."""
     for item in spec.inputs:
-        if item.kind is InputKind.BOUNDARY:
+        if item.kind.is_ground:
             for issue in call.inputs[item.name].issues:
                 terminal.note(issue.message)
 

@@ -10,11 +10,14 @@ from urban_processing.algorithms.spec import Output, OutputKind
 from urban_processing.errors import ParameterError
 
 
-def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
-    """Return one sentence for each reason why an output cannot be written where it is to go."""
+def problems(output: Output, whole: Output, given: Mapping[str, Any]) -> list[str]:
+    """Return one sentence for each reason why an output cannot be written where it is to go.
+
+    `whole` is what it is a view of, or the output itself.
+    """
     path, overwrite = Path(given[output.name]), given["overwrite"]
-    if output.kind is OutputKind.LAYOUT:
-        from urban_processing.layout_file.files import check_output
+    if output.kind.is_geopackage:
+        from urban_processing.layout_file.writing import check_output
 
         return check_output(path, overwrite=overwrite)
     if output.kind is OutputKind.MAP:
@@ -24,7 +27,9 @@ def problems(output: Output, given: Mapping[str, Any]) -> list[str]:
     from urban_processing.io.exports import check_export
 
     try:
-        return check_export(path, kind=given[_format(output)], overwrite=overwrite)
+        return check_export(
+            path, kind=given[_format(output)], overwrite=overwrite, layers=whole.layers
+        )
     except ParameterError as error:
         return list(error.problems)
 
@@ -36,14 +41,33 @@ def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
         from urban_processing.io.files import write_layout
 
         return write_layout(made, path, overwrite=overwrite, record_seconds=given["record_seconds"])
+    if output.kind is OutputKind.LAYERS:
+        from urban_processing.io.files import write_layers
+
+        return write_layers(made, path, overwrite=overwrite, record_seconds=given["record_seconds"])
     if output.kind is OutputKind.MAP:
+        _plot(made, path)
+        return path
+    from urban_processing.io.exports import export_layers, export_layout
+    from urban_processing.tables import LayerSet
+
+    how = {"kind": given[_format(output)], "overwrite": overwrite}
+    if isinstance(made, LayerSet):
+        return export_layers(made.layers(), path, crs=made.frame.crs, **how)
+    return export_layout(made, path, **how)
+
+
+def _plot(made: Any, path: Path) -> None:
+    from urban_processing.tables import LayerSet
+
+    if isinstance(made, LayerSet):
+        from urban_processing.report.layers_map import plot_layers
+
+        plot_layers(made, path)
+    else:
         from urban_processing.report.map import plot_layout
 
         plot_layout(made, path)
-        return path
-    from urban_processing.io.exports import export_layout
-
-    return export_layout(made, path, kind=given[_format(output)], overwrite=overwrite)
 
 
 def _format(output: Output) -> str:

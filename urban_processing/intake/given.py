@@ -71,11 +71,11 @@ class GivenLayers(Generic[C]):
     def problems(self) -> list[str]:
         """Return what is wrong with the kinds of geometry and with coordinates."""
         return [
-            *_wrong(self.fixed_streets, "Fixed streets", "line"),
-            *_wrong(self.rim_lines, "Rim lines", "line"),
-            *_wrong(self.entries, "Entries", "point"),
-            *_wrong(self.obstacles, "Obstacles", "polygon"),
-            *_wrong(self.locked, "Locked land", "polygon"),
+            *wrong_kind(self.fixed_streets, "Fixed streets", "line"),
+            *wrong_kind(self.rim_lines, "Rim lines", "line"),
+            *wrong_kind(self.entries, "Entries", "point"),
+            *wrong_kind(self.obstacles, "Obstacles", "polygon"),
+            *wrong_kind(self.locked, "Locked land", "polygon"),
         ]
 
     def put_into(self, site: Site, projection: Projection[C]) -> Site:
@@ -104,18 +104,18 @@ class GivenLayers(Generic[C]):
         return dataclasses.replace(
             whole,
             issues=(*site.issues, *issues),
-            input_sha256=_digest(site.input_sha256, layers) if layers else site.input_sha256,
+            input_sha256=layers_digest(site.input_sha256, layers) if layers else site.input_sha256,
         )
 
 
-def _wrong(features: Features[Any] | None, name: str, kind: str) -> list[str]:
+def wrong_kind(features: Features[Any] | None, name: str, kind: str) -> list[str]:
     """Say if a layer has no geometry, another kind of geometry, or coordinates without value."""
     if features is None:
         return []
     usable = features.geometry[features.present()]
     if not len(usable):
         return [f"{name}: {features.name} has no {kind}s: leave it out, or give another layer."]
-    parts = _flat(list(usable))
+    parts = flat_geometries(list(usable))
     found = {g.geom_type for g in parts}
     wanted = {"line": {"LineString", "LinearRing"}, "point": {"Point"}, "polygon": {"Polygon"}}
     if found - wanted[kind]:
@@ -125,11 +125,11 @@ def _wrong(features: Features[Any] | None, name: str, kind: str) -> list[str]:
     return []
 
 
-def _flat(geometry: Sequence[shapely.Geometry]) -> list[shapely.Geometry]:
+def flat_geometries(geometry: Sequence[shapely.Geometry]) -> list[shapely.Geometry]:
     """Single geometries of possibly nested collections."""
     out: list[shapely.Geometry] = []
     for g in geometry:
-        out += _flat(list(g.geoms)) if hasattr(g, "geoms") else [g]
+        out += flat_geometries(list(g.geoms)) if hasattr(g, "geoms") else [g]
     return out
 
 
@@ -157,7 +157,7 @@ class _Local(Generic[C]):
         if features is None:
             return
         for row in features.present():
-            for line in _flat([features.geometry[row]]):
+            for line in flat_geometries([features.geometry[row]]):
                 try:
                     local = self._geometry(features, shapely.LineString(line.coords))
                 except BoundaryError as error:
@@ -176,7 +176,7 @@ class _Local(Generic[C]):
         bad = (
             0
             if widths is None
-            else sum(math.isnan(width[i]) and not _is_blank(widths[i]) for i in features.present())
+            else sum(math.isnan(width[i]) and not is_blank(widths[i]) for i in features.present())
         )
         if bad:
             self.issues.append(
@@ -188,7 +188,7 @@ class _Local(Generic[C]):
                 )
             )
         return [
-            FixedStreet(line, "" if names is None else _text(names[row]), float(width[row]))
+            FixedStreet(line, "" if names is None else text(names[row]), float(width[row]))
             for row, line in lines
         ]
 
@@ -216,7 +216,7 @@ class _Local(Generic[C]):
         """Places of entries, checked to lie near the rim."""
         if features is None:
             return np.empty((0, 2))
-        points = _flat(list(features.geometry[features.present()]))
+        points = flat_geometries(list(features.geometry[features.present()]))
         try:
             local = [self._geometry(features, p) for p in points]
         except BoundaryError as error:
@@ -249,7 +249,7 @@ class _Local(Generic[C]):
         try:
             each = clean_each(features)
             for polygon, row in zip(each.valid, each.row.tolist(), strict=True):
-                use = "" if uses is None else _text(uses[row])
+                use = "" if uses is None else text(uses[row])
                 taken = shapely.union_all([other.polygon for other in out])
                 for piece in self._polygonal(features, polygon):
                     rest = shapely.difference(piece, taken, grid_size=GRID)
@@ -276,7 +276,7 @@ def _rim(site: Site) -> shapely.Geometry:
 
 def _polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     """Polygons of any geometry, in the order of their coordinates."""
-    parts = [p for p in _flat([geometry]) if p.geom_type == "Polygon" and p.area > 0]
+    parts = [p for p in flat_geometries([geometry]) if p.geom_type == "Polygon" and p.area > 0]
     canonical = canonical_rings(np.array(parts, dtype=object))
     return sorted(canonical, key=lambda p: (p.bounds, p.wkb))
 
@@ -294,15 +294,17 @@ def _positive_numbers(values: npt.NDArray[Any] | None, n: int) -> FloatArray:
     return out
 
 
-def _is_blank(value: Any) -> bool:
+def is_blank(value: Any) -> bool:
+    """Whether an attribute has no value: None, an empty text or NaN."""
     return value is None or value == "" or (isinstance(value, float) and math.isnan(value))
 
 
-def _text(value: Any) -> str:
-    return "" if _is_blank(value) else str(value).strip()
+def text(value: Any) -> str:
+    """Return an attribute as text, empty where there is none."""
+    return "" if is_blank(value) else str(value).strip()
 
 
-def _digest(before: str, layers: Sequence[Features[Any]]) -> str:
+def layers_digest(before: str, layers: Sequence[Features[Any]]) -> str:
     """Hash of all that was given, whatever the order of features."""
     found = hashlib.sha256(before.encode())
     for features in layers:

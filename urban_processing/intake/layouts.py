@@ -10,10 +10,11 @@ import shapely
 
 from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError
-from urban_processing.intake.crs_choice import CrsLibrary, choose_crs, crs_label
+from urban_processing.intake.crs_choice import CrsLibrary
 from urban_processing.intake.features import Features
 from urban_processing.intake.polygons import clean_each
 from urban_processing.intake.projection import Projection
+from urban_processing.intake.working import working_crs
 from urban_processing.layout import Layout
 from urban_processing.site import Frame, Issue, snap_to_grid
 
@@ -75,16 +76,9 @@ def _projected_parcels(
     if len(polygons) == 0:
         raise BoundaryError(f"{parcels.name}: its polygons have no area.")
     issues = [Issue(note.code, note.message, value=note.value) for note in cleaned.notes]
-    target = own
-    if own is not None:
-        chosen = choose_crs(own, shapely.get_coordinates(polygons), library)
-        target = chosen.crs
-        if chosen.reason:
-            message = (
-                f"The parcels are in {crs_label(own, library)}, but {chosen.reason}: the layout "
-                f"is in {crs_label(chosen.crs, library)}."
-            )
-            issues.append(Issue("crs_changed", message))
+    target = working_crs(
+        shapely.get_coordinates(polygons), own, None, library, issues, what="The parcels are"
+    )
     projection = Projection(own, target, library)
     mapped = np.array([projection.geometry(polygon) for polygon in polygons], dtype=object)
     return mapped, projection, issues

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+import numpy as np
+import numpy.typing as npt
 import shapely
 
 from urban_processing.intake.crs_choice import CrsLibrary
@@ -43,8 +45,12 @@ class Projection(Generic[C]):
 
     def geometry(self, geometry: shapely.Geometry) -> shapely.Geometry:
         """Return a geometry in the target; long edges in degrees become several."""
+        return self.geometries(np.array([geometry], dtype=object))[0]
+
+    def geometries(self, geometries: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+        """(n,) geometries in the target; long edges in degrees become several."""
         if self.source is None or self.is_identity:
-            return geometry
+            return geometries
         if self.library.facts(self.source).geographic:
-            geometry = shapely.segmentize(geometry, MAX_STEP_DEGREES)
-        return shapely.transform(geometry, self.points)
+            geometries = shapely.segmentize(geometries, MAX_STEP_DEGREES)
+        return np.asarray(shapely.transform(geometries, self.points), dtype=object)

@@ -11,11 +11,12 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import BoundaryError
-from urban_processing.intake.crs_choice import CrsLibrary, choose_crs, crs_label
+from urban_processing.intake.crs_choice import CrsLibrary
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GivenLayers
 from urban_processing.intake.polygons import Cleaned, clean_polygons
 from urban_processing.intake.projection import Projection
+from urban_processing.intake.working import source_crs, working_crs
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.site import GRID, FloatArray, Frame, Issue, Site, snap_to_grid
 
@@ -78,11 +79,11 @@ def build_site(
     if features is None:
         raise BoundaryError(found)
     issues: list[Issue] = []
-    own = _source_crs(features, asked, library, found, issues)
+    own = source_crs(features, asked, library, found, issues)
     cleaned = _cleaned(features, found)
     if found or cleaned is None:
         raise BoundaryError(found)
-    working = _working_crs(cleaned, own, asked, library, issues)
+    working = working_crs(shapely.get_coordinates(cleaned.land), own, asked, library, issues)
     projection = Projection(own, working, library)
     land, origin = _to_local(cleaned.land, projection)
     parts = _sorted_parts(_without_slivers(land, issues))
@@ -99,63 +100,12 @@ def build_site(
     return site if given is None else given.put_into(site, projection)
 
 
-def _source_crs(
-    features: Features[C],
-    asked: C | None,
-    library: CrsLibrary[C],
-    problems: list[str],
-    issues: list[Issue],
-) -> C | None:
-    """CRS of the source's coordinates: its own, else the one asked for."""
-    if features.crs is not None:
-        if asked is not None and not library.facts(asked).metric:
-            problems.append(
-                f"crs must be projected and in metres; {crs_label(asked, library)} is not. "
-                "Choose for example the UTM zone, or leave crs out."
-            )
-        return features.crs
-    if asked is not None:
-        if not features.bare:
-            message = f"{features.name} has no CRS; {crs_label(asked, library)} was taken for it."
-            issues.append(Issue("crs_assumed", message))
-        return asked
-    if not features.bare and not problems:
-        problems.append(
-            f"{features.name} has no CRS. Give it with crs (--crs EPSG:code), or assign it in "
-            "the data: GeoDataFrame.set_crs, or Assign Projection in QGIS."
-        )
-    return None
-
-
 def _cleaned(features: Features[C], problems: list[str]) -> Cleaned | None:
     try:
         return clean_polygons(features)
     except BoundaryError as error:
         problems += error.problems
         return None
-
-
-def _working_crs(
-    cleaned: Cleaned,
-    own: C | None,
-    asked: C | None,
-    library: CrsLibrary[C],
-    issues: list[Issue],
-) -> C | None:
-    if own is None:
-        return None
-    if asked is not None and library.facts(asked).metric:
-        return asked
-    chosen = choose_crs(own, shapely.get_coordinates(cleaned.land), library)
-    if chosen.reason:
-        issues.append(
-            Issue(
-                "crs_changed",
-                f"The boundary is in {crs_label(own, library)}, but {chosen.reason}: the layout "
-                f"is in {crs_label(chosen.crs, library)}.",
-            )
-        )
-    return chosen.crs
 
 
 def _to_local(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from os import PathLike, fspath
-
 import numpy as np
 import numpy.typing as npt
 import pyproj
@@ -13,8 +11,8 @@ from urban_processing.errors import BoundaryError
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.sites import build_site
-from urban_processing.io.crs import PYPROJ, parse_crs
-from urban_processing.io.features import Source, read_features
+from urban_processing.io.crs import PYPROJ, asked_crs
+from urban_processing.io.features import Source, read_features, split_layer_name
 from urban_processing.site import Site
 
 
@@ -84,7 +82,7 @@ def read_boundary(
     ('EPSG:32630', 9600.0)
     """
     problems: list[str] = []
-    asked = _asked_crs(crs, problems)
+    asked = asked_crs(crs, problems)
     features = _read(source, layer, where, problems)
     given_corners = _read_points(corners, "Corners", problems)
     given = GivenLayers(
@@ -109,16 +107,6 @@ def _read(
 ) -> Features[pyproj.CRS] | None:
     try:
         return read_features(source, layer=layer, where=where)
-    except BoundaryError as error:
-        problems += error.problems
-        return None
-
-
-def _asked_crs(crs: object, problems: list[str]) -> pyproj.CRS | None:
-    if crs is None:
-        return None
-    try:
-        return parse_crs(crs)
     except BoundaryError as error:
         problems += error.problems
         return None
@@ -150,10 +138,7 @@ def _read_given(
 
 def _read_layer(source: Source, kind: str) -> Features[pyproj.CRS]:
     """Read a layer with geometries of a kind; its file may be followed by a layer's name."""
-    layer = None
-    if isinstance(source, str | PathLike):
-        path, _, name = fspath(source).partition("|layername=")
-        source, layer = path, name or None
+    source, layer = split_layer_name(source)
     return read_features(source, layer=layer, kind=kind, columns=GIVEN_COLUMNS)
 
 

@@ -103,3 +103,14 @@ def crs_text(crs: pyproj.CRS) -> str:
         if pyproj.CRS.from_user_input(code).equals(crs, ignore_axis_order=True):
             return code
     return local_equal_area_again(crs.name) or str(crs.to_wkt("WKT2_2019"))
+
+
+def asked_crs(crs: object, problems: list[str]) -> pyproj.CRS | None:
+    """Return a CRS that was asked for; None if none was, or what is wrong is in `problems`."""
+    if crs is None:
+        return None
+    try:
+        return parse_crs(crs)
+    except BoundaryError as error:
+        problems += error.problems
+        return None

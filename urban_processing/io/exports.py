@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import tempfile
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from urban_processing.io.frames import table_frame
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import as_written
 from urban_processing.layout_file.geopackage import field_arrays
-from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.metrics.tables import layout_tables
 from urban_processing.paths import folder_problems
-from urban_processing.schema import LAYERS, GeometryType, Layer
+from urban_processing.schema import LAYERS, GeometryType, Layer, layer
+from urban_processing.tables import Table
 
 COORDINATE_DIGITS = "9"
 """Digits after the point of degrees: 0.1 mm, so that neighbours still fit together."""
@@ -38,16 +40,32 @@ def export_layout(
     kind: str = ExportKind.GEOJSON,
     overwrite: bool = False,
 ) -> Path:
-    """Write every layer of a layout as a file of its own.
+    """Write every layer of a layout as a file of its own; see `export_layers`."""
+    tables = layout_tables(as_written(layout))
+    layers = {layer(name): table for name, table in tables.items()}
+    return export_layers(layers, folder, crs=layout.frame.crs, kind=kind, overwrite=overwrite)
+
+
+def export_layers(
+    layers: Mapping[Layer, Table],
+    folder: str | PathLike[str],
+    *,
+    crs: str,
+    kind: str = ExportKind.GEOJSON,
+    overwrite: bool = False,
+) -> Path:
+    """Write every layer as a file of its own.
 
     Layers without geometry become CSV beside GeoJSON, and Parquet beside GeoParquet.
 
     Parameters
     ----------
-    layout
-        The layout.
+    layers
+        Rows of each layer.
     folder
         Folder for the files; made if its parent exists.
+    crs
+        CRS of the geometries as text, "" for none.
     kind
         An `ExportKind`.
     overwrite
@@ -61,25 +79,20 @@ def export_layout(
     Raises
     ------
     OutputError
-        If files cannot be written there, or GeoJSON is asked for and the layout has no CRS.
+        If files cannot be written there, or GeoJSON is asked for and there is no CRS.
     """
     target = Path(folder)
-    problems = check_export(target, kind=kind, overwrite=overwrite)
+    problems = check_export(target, kind=kind, overwrite=overwrite, layers=layers)
     chosen = ExportKind(kind)
-    if chosen is ExportKind.GEOJSON and not layout.frame.crs:
+    if chosen is ExportKind.GEOJSON and not crs:
         problems.append("GeoJSON is in WGS 84, but the layout has no CRS: give its boundary one.")
     if problems:
         raise OutputError(problems)
-    tables = layout_tables(as_written(layout))
-    layers = [layer for layer in LAYERS if layer.name in tables]
     write = _write_geojson if chosen is ExportKind.GEOJSON else _write_parquet
     try:
         target.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target, prefix=".export-") as temporary:
-            made = [
-                write(Path(temporary), layer, tables[layer.name], layout.frame.crs)
-                for layer in layers
-            ]
+            made = [write(Path(temporary), each, table, crs) for each, table in layers.items()]
             for file in made:
                 file.replace(target / file.name)
     except (DataSourceError, DataLayerError, FeatureError, OSError) as error:
@@ -88,9 +101,13 @@ def export_layout(
 
 
 def check_export(
-    folder: str | PathLike[str], *, kind: str = ExportKind.GEOJSON, overwrite: bool = False
+    folder: str | PathLike[str],
+    *,
+    kind: str = ExportKind.GEOJSON,
+    overwrite: bool = False,
+    layers: Iterable[Layer] = LAYERS,
 ) -> list[str]:
-    """Return why a layout cannot be exported to a folder; nothing where it can.
+    """Return why layers cannot be exported to a folder; nothing where they can.
 
     Raises
     ------
@@ -105,7 +122,7 @@ def check_export(
     problems = folder_problems(target)
     if problems or overwrite:
         return problems
-    names = (layer.name + _suffix(layer, ExportKind(kind)) for layer in LAYERS)
+    names = (each.name + _suffix(each, ExportKind(kind)) for each in layers)
     existing = [name for name in names if (target / name).exists()]
     if existing:
         problems.append(
@@ -145,7 +162,7 @@ def _write_geojson(folder: Path, layer: Layer, table: Table, crs: str) -> Path:
 def _write_parquet(folder: Path, layer: Layer, table: Table, crs: str) -> Path:
     path = folder / (layer.name + _suffix(layer, ExportKind.PARQUET))
     try:
-        table_frame(layer.name, table, crs=crs).to_parquet(path)
+        table_frame(layer, table, crs=crs).to_parquet(path)
     except ImportError as error:
         raise DependencyError("GeoParquet needs the package pyarrow: install it.") from error
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -34,7 +35,7 @@ def read_features(
     layer: str | None = None,
     where: str | None = None,
     kind: str = "polygon",
-    columns: Sequence[str] = (),
+    columns: Sequence[str] | None = (),
 ) -> Features[pyproj.CRS]:
     """Read the features of a file, or take those of a frame or of shapely geometries.
 
@@ -49,7 +50,7 @@ def read_features(
     kind
         Geometry that is looked for where a file has several layers: polygon, line or point.
     columns
-        Attributes that are wanted where the source has them.
+        Attributes that are wanted where the source has them; None for all.
 
     Raises
     ------
@@ -76,10 +77,48 @@ def read_features(
     return Features(_as_geometries(source), None, "The geometry", bare=True)
 
 
-def _columns_of(frame: Any, columns: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
-    """Wanted columns of a GeoDataFrame; a GeoSeries has none."""
+def split_layer_name(source: Source) -> tuple[Source, str | None]:
+    """Split a file from the layer named after it, as in ``file.gpkg|layername=roads``."""
+    if not isinstance(source, str | PathLike):
+        return source, None
+    path, _, name = fspath(source).partition("|layername=")
+    return path, name or None
+
+
+def _columns_of(frame: Any, columns: Sequence[str] | None) -> dict[str, npt.NDArray[Any]]:
+    """Wanted columns of a GeoDataFrame; a GeoSeries has none. None for values that are missing.
+
+    Where all columns are wanted, those of the index are among them.
+    """
+    if columns is None:
+        frame = frame.reset_index() if any(frame.index.names) else frame
+        columns = [name for name in getattr(frame, "columns", ()) if name != frame.geometry.name]
     known = getattr(frame, "columns", ())
-    return {name: np.asarray(frame[name], dtype=object) for name in columns if name in known}
+    out = {}
+    for name in (name for name in columns if name in known):
+        values = np.array(frame[name], dtype=object)
+        missing = np.asarray(frame[name].isna(), dtype=bool)
+        # NaN in a column of numbers is a value of it, and may be a mistake
+        values[missing & ~_are_nan(values)] = None
+        out[name] = values
+    return out
+
+
+def _of_file(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Columns of a file: None for the empty cells, which were read as NaN."""
+    out = dict(columns)
+    for name, values in columns.items():
+        empty = _are_nan(values)
+        if empty.any():
+            out[name] = values.astype(object)
+            out[name][empty] = None
+    return out
+
+
+def _are_nan(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    if values.dtype.kind == "f":
+        return np.asarray(np.isnan(values))
+    return np.array([isinstance(v, float) and math.isnan(v) for v in values], dtype=bool)
 
 
 def _as_geometries(source: Any) -> npt.NDArray[np.object_]:
@@ -114,7 +153,7 @@ def _must_exist(path: str) -> None:
 
 
 def _read_parquet(
-    path: str, layer: str | None, where: str | None, columns: Sequence[str]
+    path: str, layer: str | None, where: str | None, columns: Sequence[str] | None
 ) -> Features[pyproj.CRS]:
     import geopandas
 
@@ -134,12 +173,12 @@ def _read_parquet(
         np.asarray(frame.geometry, dtype=object),
         _usable(frame.crs),
         path,
-        columns=_columns_of(frame, columns),
+        columns=_of_file(_columns_of(frame, columns)),
     )
 
 
 def _read_file(
-    path: str, layer: str | None, where: str | None, kind: str, columns: Sequence[str]
+    path: str, layer: str | None, where: str | None, kind: str, columns: Sequence[str] | None
 ) -> Features[pyproj.CRS]:
     _must_exist(path)
     layer = _choose_layer(path, layer, kind)
@@ -148,7 +187,7 @@ def _read_file(
             path,
             layer=layer,
             where=where,
-            columns=list(columns),
+            columns=None if columns is None else list(columns),
             force_2d=True,
             read_geometry=True,
         )
@@ -164,9 +203,8 @@ def _read_file(
     crs = _usable(meta["crs"])
     with np.errstate(invalid="ignore"):  # coordinates that are not finite are told of later
         geometry = np.asarray(shapely.from_wkb(wkb), dtype=object)
-    return Features(
-        geometry, crs, path, columns=dict(zip(meta["fields"].tolist(), values, strict=True))
-    )
+    known = dict(zip(meta["fields"].tolist(), values, strict=True))
+    return Features(geometry, crs, path, columns=_of_file(known))
 
 
 def _choose_layer(path: str, layer: str | None, wanted: str) -> str:

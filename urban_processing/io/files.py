@@ -8,7 +8,9 @@ from pathlib import Path
 from urban_processing.io.frames import GeoLayout
 from urban_processing.io.geopackage import PYOGRIO
 from urban_processing.layout import Layout
-from urban_processing.layout_file import files
+from urban_processing.layout_file import files, subdivisions, writing
+from urban_processing.parcelling.reuse import Previous
+from urban_processing.tables import LayerSet
 
 
 def write_layout(
@@ -45,6 +47,24 @@ def write_layout(
     """
     written = files.as_written(layout, record_seconds=record_seconds)
     return files.write_layout(written, path, library=PYOGRIO, overwrite=overwrite)
+
+
+def write_layers(
+    made: LayerSet,
+    path: str | PathLike[str],
+    *,
+    overwrite: bool = False,
+    record_seconds: bool = False,
+) -> Path:
+    """Write layers as a GeoPackage; see `urban_processing.layout_file.writing`."""
+    return writing.write_layer_set(
+        made, path, library=PYOGRIO, overwrite=overwrite, record_seconds=record_seconds
+    )
+
+
+def read_subdivision(path: str | PathLike[str]) -> Previous:
+    """Read a file of parcels; see `urban_processing.layout_file.subdivisions`."""
+    return subdivisions.read_subdivision(path, library=PYOGRIO)
 
 
 def read_layout(path: str | PathLike[str], *, snap: float | None = None) -> GeoLayout:

@@ -11,8 +11,9 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 
-from urban_processing.metrics import MeasuredLayout, Table
-from urban_processing.schema import ColumnType, GeometryType, layer
+from urban_processing.metrics import MeasuredLayout
+from urban_processing.schema import PROVENANCE, ColumnType, GeometryType, Layer, layer
+from urban_processing.tables import LayerSet, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,7 +96,7 @@ class GeoLayout(MeasuredLayout):
 
     def frame(self, name: str) -> gpd.GeoDataFrame | pd.DataFrame:
         """Return a layer of the schema as a frame of its own; empty if the layout has none."""
-        return table_frame(name, self.tables.get(name), crs=self.layout.frame.crs)
+        return table_frame(layer(name), self.tables.get(name), crs=self.layout.frame.crs)
 
     def plot(
         self,
@@ -135,9 +136,68 @@ class GeoLayout(MeasuredLayout):
         )
 
 
-def table_frame(name: str, table: Table | None, *, crs: str) -> gpd.GeoDataFrame | pd.DataFrame:
-    """Return a table of the schema as a frame: whole numbers that may be missing as Int64."""
-    declared = layer(name)
+@dataclass(frozen=True, eq=False)
+class GeoLayers:
+    """Layers that an algorithm made, as GeoDataFrames in map coordinates, by their names.
+
+    Parameters
+    ----------
+    made
+        The layers as plain tables.
+    """
+
+    made: LayerSet
+
+    def __getattr__(self, name: str) -> gpd.GeoDataFrame | pd.DataFrame:
+        """Return the layer of that name as a frame of its own."""
+        if name.startswith("_") or name not in self.__dir__():
+            layers = ", ".join(self.made.names)
+            raise AttributeError(f"There is no layer {name!r}; there are {layers}.")
+        return self.frame(name)
+
+    def __dir__(self) -> list[str]:
+        """Return the names of layers beside those of methods."""
+        return [*super().__dir__(), *self.made.names, PROVENANCE.name]
+
+    @property
+    def crs(self) -> Any:
+        """CRS of the geometries, None for a plane without CRS."""
+        return gpd.GeoSeries([], crs=self.made.frame.crs or None).crs
+
+    def frame(self, name: str) -> gpd.GeoDataFrame | pd.DataFrame:
+        """Return a layer as a frame of its own."""
+        for each, table in self.made.layers(record_seconds=True).items():
+            if each.name == name:
+                return table_frame(each, table, crs=self.made.frame.crs)
+        raise KeyError(f"There is no layer {name}; there are {', '.join(self.made.names)}.")
+
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        overwrite: bool = False,
+        record_seconds: bool = False,
+    ) -> Path:
+        """Write a GeoPackage; see `urban_processing.io.files.write_layers`."""
+        from urban_processing.io.files import write_layers
+
+        return write_layers(self.made, path, overwrite=overwrite, record_seconds=record_seconds)
+
+    def plot(self, path: str | PathLike[str] | None = None, *, title: str = "") -> Figure:
+        """Draw a map; see `urban_processing.report.layers_map.plot_layers`."""
+        from urban_processing.report.layers_map import plot_layers
+
+        return plot_layers(self.made, path, title=title)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(t):,} {each.name}" for each, t in self.made.tables.items())
+        return f"GeoLayers({self.made.kind}: {counts}, {self.made.frame.crs or 'no CRS'})"
+
+
+def table_frame(
+    declared: Layer, table: Table | None, *, crs: str
+) -> gpd.GeoDataFrame | pd.DataFrame:
+    """Return a table as a frame: whole numbers that may be missing as Int64."""
     columns: dict[str, Any] = {}
     for column in declared.columns:
         values = np.empty(0, dtype=object) if table is None else table[column.name]

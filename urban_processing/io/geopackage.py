@@ -20,8 +20,8 @@ from urban_processing.layout_file.geopackage import (
     VERSION,
     field_arrays,
 )
-from urban_processing.metrics.tables import Table
 from urban_processing.schema import GeometryType, Layer
+from urban_processing.tables import Table
 
 
 class Pyogrio:
@@ -66,7 +66,12 @@ def _write_layer(path: Path, layer: Layer, table: Table, *, crs: str) -> None:
     options: dict[str, Any] = {"layer_options": {"IDENTIFIER": layer.title}}
     if spatial:
         kind = "Unknown" if layer.geometry is GeometryType.ANY else layer.geometry.value
-        options |= {"geometry_type": kind, "crs": crs or None, "promote_to_multi": False}
+        several = layer.geometry is not GeometryType.ANY and table.in_pieces
+        options |= {
+            "geometry_type": f"Multi{kind}" if several else kind,
+            "crs": crs or None,
+            "promote_to_multi": several,
+        }
         options["layer_options"] |= {
             "GEOMETRY_NAME": GEOMETRY_COLUMN,
             "SPATIAL_INDEX": "YES",

@@ -43,7 +43,7 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
         ("Streets", streets, STREETS, "line"),
     ):
         try:
-            found.append(read_features(source, layer=_layer_of(source, layer.name), kind=kind))
+            found.append(read_features(source, layer=layer_in(source, layer.name), kind=kind))
         except BoundaryError as error:
             problems += [f"{called}: {problem}" for problem in error.problems]
     if problems:
@@ -51,8 +51,8 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
     return build_layout(*found, library=PYPROJ, snap=snap)
 
 
-def _layer_of(source: Source, name: str) -> str | None:
-    """Name of the layer to read: the one that a layout file has for it, where it is there."""
+def layer_in(source: Source, name: str) -> str | None:
+    """Return the name of a layer if a source is a file that has it, else None."""
     if not isinstance(source, str | PathLike) or not Path(source).is_file():
         return None
     try:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -19,11 +16,17 @@ import shapely
 
 from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
-from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Step
-from urban_processing.layout_file.geopackage import LayerLibrary, read_state, write_geopackage
+from urban_processing.layout import NOT_FIXED, GivenStreet, Layout
+from urban_processing.layout_file.geopackage import (
+    LAYOUT_STATE,
+    LayerLibrary,
+    read_state,
+    write_geopackage,
+)
+from urban_processing.layout_file.writing import check_output, replacing
 from urban_processing.mesh.places import line_segments, vertices_at
-from urban_processing.metrics.tables import Table, layout_tables
-from urban_processing.paths import geopackage_problems
+from urban_processing.metrics.tables import layout_tables
+from urban_processing.provenance import Step, timeless
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
 from urban_processing.schema import (
     INPUT_BOUNDARY,
@@ -32,9 +35,11 @@ from urban_processing.schema import (
     PARCELS,
     PROVENANCE,
     STREETS,
+    layer,
 )
 from urban_processing.site import FloatArray, Frame, Issue
 from urban_processing.street_rules import StreetRules
+from urban_processing.tables import Table
 
 FILE_FORMAT = 1
 """Number of the way in which layout files keep what the schema does not say."""
@@ -80,9 +85,13 @@ def write_layout(
     if problems:
         raise OutputError(problems)
     known = layout_tables(layout) if tables is None else tables
-    with _replacing(target) as temporary:
+    with replacing(target) as temporary:
         write_geopackage(
-            temporary, known, crs=layout.frame.crs, state=_state(layout), library=library
+            temporary,
+            {layer(name): table for name, table in known.items()},
+            crs=layout.frame.crs,
+            state=(LAYOUT_STATE, _state(layout)),
+            library=library,
         )
     return target
 
@@ -92,28 +101,8 @@ def as_written(layout: Layout, *, record_seconds: bool = False) -> Layout:
 
     With `record_seconds` its steps keep the time they took: then no two runs give the same.
     """
-    return canonical(layout if record_seconds else timeless(layout))
-
-
-def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[str]:
-    """Return one sentence for each reason why a layout file cannot be written.
-
-    Meant to be asked before a long run.
-    """
-    target = Path(path)
-    problems = geopackage_problems(target)
-    if target.is_file() and not overwrite:
-        problems.append(
-            f"The output {target} exists already: choose another name, or allow overwriting "
-            "(--overwrite)."
-        )
-    return problems
-
-
-def timeless(layout: Layout) -> Layout:
-    """Return the layout without how long its steps took, which no two runs share."""
-    steps = [dataclasses.replace(step, seconds=math.nan) for step in layout.history]
-    return layout.replace(history=tuple(steps))
+    history = layout.history if record_seconds else timeless(layout.history)
+    return canonical(layout.replace(history=history))
 
 
 def read_layout(
@@ -249,18 +238,6 @@ class _File:
         return shapely.transform(geometry, lambda xy: xy - np.asarray(self.frame.origin))
 
 
-@contextmanager
-def _replacing(target: Path) -> Iterator[Path]:
-    """Give a temporary file beside `target` that takes its place if all goes well."""
-    try:
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
-            temporary = Path(folder) / target.name
-            yield temporary
-            temporary.replace(target)
-    except OSError as error:
-        raise OutputError(f"{target} cannot be written: {error}") from error
-
-
 def _state(layout: Layout) -> str:
     """Return what the layers do not say about a layout, as JSON."""
     return json.dumps(
@@ -285,7 +262,7 @@ def _state(layout: Layout) -> str:
 def _read_state(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise BoundaryError(f"The file {path} does not exist.")
-    text = read_state(path)
+    text = read_state(path, LAYOUT_STATE)
     if text is None:
         raise BoundaryError(
             f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."

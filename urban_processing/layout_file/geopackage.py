@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from urban_processing.layout_file.styles import layer_style
-from urban_processing.metrics.tables import Table
-from urban_processing.schema import LAYERS, ColumnType, Layer
+from urban_processing.schema import ColumnType, Layer
+from urban_processing.tables import Table
 
 VERSION = "1.3"
 """GeoPackage version: the newest that QGIS 3.22 reads."""
@@ -21,9 +21,10 @@ VERSION = "1.3"
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 """Date that files carry in place of the day they were written on."""
 
-STATE_URI = "urn:urban-processing:layout"
-"""Standard of the metadata row that holds what the tables do not say. Metadata under GDAL's own
-standard would make GDAL leave an .aux.xml file beside the GeoPackage."""
+LAYOUT_STATE, LAYERS_STATE = "urn:urban-processing:layout", "urn:urban-processing:layers"
+"""Standard of the metadata row that holds what the tables do not say, of a layout and of other
+layers. Metadata under GDAL's own standard would make GDAL leave an .aux.xml file beside the
+GeoPackage."""
 
 GEOMETRY_COLUMN = "geom"
 """Name of the column of geometries."""
@@ -88,7 +89,12 @@ class LayerLibrary(Protocol):
 
 
 def write_geopackage(
-    path: Path, tables: Mapping[str, Table], *, crs: str, state: str, library: LayerLibrary
+    path: Path,
+    tables: Mapping[Layer, Table],
+    *,
+    crs: str,
+    library: LayerLibrary,
+    state: tuple[str, str],
 ) -> None:
     """Write tables as the layers of a new GeoPackage, with QGIS styles and column names.
 
@@ -97,18 +103,18 @@ def write_geopackage(
     path
         File to create.
     tables
-        Tables by name of the layer, of layers in the schema; written in its order.
+        Rows of each layer, written in their order.
     crs
         CRS of the geometries as text, "" for none.
-    state
-        JSON kept in the file's metadata, for `read_state`.
     library
         What writes the layers.
+    state
+        `LAYOUT_STATE` or `LAYERS_STATE`, and JSON kept in the file's metadata, for `read_state`.
     """
-    layers = [layer for layer in LAYERS if layer.name in tables]
-    library.write_layers(path, {layer: tables[layer.name] for layer in layers}, crs=crs)
+    layers = list(tables)
+    library.write_layers(path, tables, crs=crs)
     with closing(sqlite3.connect(path)) as connection, connection:
-        _write_state(connection, state)
+        _write_state(connection, *state)
         _write_styles(connection, layers)
         _write_column_names(connection, layers)
 
@@ -142,23 +148,26 @@ def field_values(layer: Layer, table: Table) -> list[list[Any]]:
     return columns
 
 
-def read_state(path: Path) -> str | None:
-    """Return the state of a file that `write_geopackage` wrote, None for any other file."""
+def read_state(path: Path, standard: str) -> str | None:
+    """Return the state of a file that `write_geopackage` wrote, None for any other file.
+
+    `standard` is `LAYOUT_STATE` or `LAYERS_STATE`.
+    """
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as connection:
             row = connection.execute(
-                "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (STATE_URI,)
+                "SELECT metadata FROM gpkg_metadata WHERE md_standard_uri = ?", (standard,)
             ).fetchone()
     except sqlite3.DatabaseError:
         return None  # no database, or one without metadata
     return None if row is None else str(row[0])
 
 
-def _write_state(connection: sqlite3.Connection, state: str) -> None:
+def _write_state(connection: sqlite3.Connection, standard: str, state: str) -> None:
     connection.executescript(_METADATA_TABLES)
     connection.execute(
         "INSERT INTO gpkg_metadata VALUES (1, 'dataset', ?, 'application/json', ?)",
-        (STATE_URI, state),
+        (standard, state),
     )
     connection.execute(
         "INSERT INTO gpkg_metadata_reference VALUES ('geopackage', NULL, NULL, NULL, ?, 1, NULL)",

@@ -55,6 +55,8 @@ def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     if name not in _RULES:
         return None
     rules = _RULES[name]()
+    if name == "parcels" and "irregularity" not in layer.column_names:
+        rules = _changed()  # parcels that were not measured, but carried over
     if places_only and layer.geometry is GeometryType.ANY:
         rules = [rule for rule in rules if rule.symbol == "marker"]
     root = ET.Element(
@@ -226,6 +228,17 @@ def _junctions() -> list[_Rule]:
     ]
 
 
+def _block_edges() -> list[_Rule]:
+    def edge(color: str, dash: str) -> list[ET.Element]:
+        options = {"line_color": color, "line_style": dash, "line_width": "0.5"}
+        return [_layer("SimpleLine", {**options, "line_width_unit": _MILLIMETRES})]
+
+    return [
+        _Rule("Street side", '"access"', edge(_CASING, "solid"), "line"),
+        _Rule("No street", "ELSE", edge(_OUTLINE, "dash"), "line"),
+    ]
+
+
 def _issues() -> list[_Rule]:
     alert = _marker("diamond", "255,255,255,255", metres=1, at_least=2.4, outline=_ALERT)
     area = _fill("200,30,40,30", outline=_ALERT, width=0.4)
@@ -236,7 +249,23 @@ def _issues() -> list[_Rule]:
     ]
 
 
+def _changed() -> list[_Rule]:
+    """Colour parcels by what became of them."""
+    return [
+        _Rule(label, f"\"change\" = '{change}'", [_fill(colour)], "fill")
+        for change, label, colour in (
+            ("kept", "Kept", _PAPER),
+            ("moved", "Moved", "250,226,160,255"),
+            ("split", "Split off", "244,190,112,255"),
+            ("new", "New", "226,125,85,255"),
+            ("merged", "Merged", "178,178,190,140"),
+            ("gone", "Gone", "120,120,130,140"),
+        )
+    ]
+
+
 _RULES = {
+    "changes": _changed,
     "parcels": _parcels,
     "streets": _streets,
     "junctions": _junctions,
@@ -249,6 +278,8 @@ _RULES = {
         _Rule("Right-of-way", "", [_fill(_SURFACE, outline=_SURFACE)], "fill")
     ],
     "net_parcels": lambda: [_Rule("Net parcel", "", [_fill(_PAPER)], "fill")],
+    "blocks": lambda: [_Rule("Block", "", [_fill(_PAPER, outline=_DARK, width=0.2)], "fill")],
+    "block_edges": _block_edges,
     "issues": _issues,
 }
 

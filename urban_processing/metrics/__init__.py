@@ -4,7 +4,8 @@ from urban_processing.metrics.certificate import Certificate, Check, certificate
 from urban_processing.metrics.measured import MeasuredLayout
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels
-from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.metrics.tables import layout_tables
+from urban_processing.tables import Table
 
 __all__ = [
     "Certificate",

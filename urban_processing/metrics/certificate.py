@@ -22,15 +22,14 @@ from urban_processing.metrics.overlap import (
     unmatched_segments,
 )
 from urban_processing.metrics.tables import (
-    Table,
     boundary_table,
-    issue_table,
     net_parcel_table,
     right_of_way_table,
     street_table,
 )
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.site import AREA_ROUNDING, GRID
+from urban_processing.tables import Table, issue_table
 
 PARTITION_LIMIT = 1e-8
 """Largest symmetric difference of parcels and land, as a share of the land's area."""
@@ -106,7 +105,7 @@ def certificate(layout: Layout, *, land: Sequence[shapely.Polygon] | None = None
         street_table(layout),
         boundary,
         min_area=layout.min_area,
-        issues=issue_table(layout),
+        issues=issue_table(layout.issues, layout.frame),
         right_of_way=None if streets is None else right_of_way_table(layout, streets),
         net_parcels=None if streets is None else net_parcel_table(layout, streets),
         net_min_area=layout.street_rules.net_min_area,

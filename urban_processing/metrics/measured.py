@@ -11,7 +11,8 @@ import numpy as np
 
 from urban_processing.layout import Layout
 from urban_processing.metrics.certificate import Certificate, certificate
-from urban_processing.metrics.tables import Table, layout_tables
+from urban_processing.metrics.tables import layout_tables
+from urban_processing.tables import Table
 
 
 @dataclass(frozen=True, eq=False)

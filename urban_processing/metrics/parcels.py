@@ -32,15 +32,15 @@ OUTLINE_TOLERANCE = 0.003
 
 @dataclass(frozen=True, eq=False)
 class ParcelMeasures:
-    """Measures of the F parcels of a layout; angles in degrees, lengths in metres.
+    """Measures of F parcels; angles in degrees, lengths in metres.
 
     Parameters
     ----------
     area
         (F,) area to the centreline of streets, m².
     corners, corner_offsets, corner_xy
-        Ragged corners of the reported approximate polygons as vertices of the mesh, and
-        their coordinates.
+        Ragged corners of the reported approximate polygons as vertices of the parcels' rings,
+        and their coordinates.
     corner_angle
         (C,) interior angle at each corner.
     sides
@@ -92,66 +92,109 @@ class ParcelMeasures:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class ParcelRings:
+    """What F parcels are measured by, wherever they come from.
+
+    Parameters
+    ----------
+    xy, offsets
+        Ragged outer rings of the parcels, counter-clockwise, closing points left out.
+    on_street
+        (N,) length in metres of street along the edge from each vertex of the rings to the next.
+    frontage
+        (F,) length in metres of each parcel's boundary, holes and all, on streets.
+    polygons
+        (F,) the parcels as polygons.
+    area
+        (F,) their areas, m².
+    rim
+        (F,) whether an edge lies on the land's rim, a hole or an obstacle.
+    """
+
+    xy: FloatArray
+    offsets: IntArray
+    on_street: FloatArray
+    frontage: FloatArray
+    polygons: npt.NDArray[np.object_]
+    area: FloatArray
+    rim: BoolArray
+
+
 def measure_parcels(layout: Layout) -> ParcelMeasures:
-    """Measure every parcel of a layout; nothing is looped over in Python."""
-    mesh, ring = layout.mesh, _sides(layout)
-    corner_xy, corner_offsets = ring.corner_xy, ring.corner_offsets
-    angle = np.degrees(interior_angles(corner_xy, corner_offsets))
-    deviation = np.add.reduceat(np.abs(angle - 90.0), corner_offsets[:-1])
-    sides = np.diff(corner_offsets)
-    width, depth = _extents(ring.xy, ring.offsets, corner_xy, corner_offsets, ring.frontage)
-    area, polygons = mesh.face_area, mesh.face_polygons()
-    enough = reached_frontage(area)
+    """Measure every parcel of a layout."""
+    mesh = layout.mesh
+    xy, offsets, on_street = _street_rings(layout)
+    return measure_rings(
+        ParcelRings(
+            xy=xy,
+            offsets=offsets,
+            on_street=on_street,
+            frontage=layout.frontage,
+            polygons=mesh.face_polygons(),
+            area=mesh.face_area,
+            rim=layout.rim_parcel,
+        )
+    )
+
+
+def measure_rings(rings: ParcelRings) -> ParcelMeasures:
+    """Measure parcels; nothing is looped over in Python."""
+    side = _sides(rings.xy, rings.offsets, rings.on_street)
+    angle = np.degrees(interior_angles(side.corner_xy, side.corner_offsets))
+    deviation = np.add.reduceat(np.abs(angle - 90.0), side.corner_offsets[:-1])
+    count = np.diff(side.corner_offsets)
+    width, depth = _extents(rings.xy, rings.offsets, side)
+    enough = reached_frontage(rings.area)
+    boxes = shapely.minimum_rotated_rectangle(rings.polygons)
     return ParcelMeasures(
-        area=area,
-        corners=mesh.origin[ring.half_edges[ring.corners]],
-        corner_offsets=corner_offsets,
-        corner_xy=corner_xy,
+        area=rings.area,
+        corners=side.corners,
+        corner_offsets=side.corner_offsets,
+        corner_xy=side.corner_xy,
         corner_angle=angle,
-        sides=sides,
-        irregularity=polygon_irregularity(corner_xy, corner_offsets),
-        frontage=layout.frontage,
+        sides=count,
+        irregularity=polygon_irregularity(side.corner_xy, side.corner_offsets),
+        frontage=rings.frontage,
         width=width,
         depth=depth,
-        thinness=inscribed_thinness(polygons, area),
-        angle_deviation=deviation / sides,
-        area_ratio=shapely.area(shapely.minimum_rotated_rectangle(polygons)) / area,
-        rim=layout.rim_parcel,
-        reached=layout.frontage >= enough,
-        through=_through_lots(corner_xy, corner_offsets, ring.frontage, enough),
+        thinness=inscribed_thinness(rings.polygons, rings.area),
+        angle_deviation=deviation / count,
+        area_ratio=shapely.area(boxes) / rings.area,
+        rim=rings.rim,
+        reached=rings.frontage >= enough,
+        through=_through_lots(side, enough),
     )
 
 
 def width_and_depth(layout: Layout) -> tuple[FloatArray, FloatArray]:
     """Width and depth of every parcel, as `ParcelMeasures` has them, without the rest of it."""
-    sides = _sides(layout)
-    return _extents(sides.xy, sides.offsets, sides.corner_xy, sides.corner_offsets, sides.frontage)
+    xy, offsets, on_street = _street_rings(layout)
+    return _extents(xy, offsets, _sides(xy, offsets, on_street))
+
+
+def _street_rings(layout: Layout) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Ragged rings of the parcels, and the length of street along each of their edges."""
+    mesh = layout.mesh
+    half_edges, offsets = mesh.face_rings()
+    on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
+    return mesh.xy[mesh.origin[half_edges]], offsets, on_street
 
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Rings of the parcels, their corners, and the frontage of each side."""
+    """Sides of the reported polygons, each with its frontage; C corners."""
 
-    half_edges: IntArray
-    offsets: IntArray
-    xy: FloatArray
     corners: IntArray
     corner_offsets: IntArray
+    corner_xy: FloatArray
     frontage: FloatArray
 
-    @property
-    def corner_xy(self) -> FloatArray:
-        return np.asarray(self.xy[self.corners])
 
-
-def _sides(layout: Layout) -> _Sides:
-    mesh = layout.mesh
-    half_edges, offsets = mesh.face_rings()
-    xy = mesh.xy[mesh.origin[half_edges]]
+def _sides(xy: FloatArray, offsets: IntArray, on_street: FloatArray) -> _Sides:
     corners, corner_offsets = reported_polygons(xy, offsets)
-    on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
     frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
-    return _Sides(half_edges, offsets, xy, corners, corner_offsets, frontage)
+    return _Sides(corners, corner_offsets, xy[corners], frontage)
 
 
 def inscribed_thinness(polygons: npt.NDArray[np.object_], area: FloatArray) -> FloatArray:
@@ -178,14 +221,9 @@ def _frontage_of_sides(
     return np.asarray(length, dtype=np.float64)
 
 
-def _extents(
-    xy: FloatArray,
-    offsets: IntArray,
-    corner_xy: FloatArray,
-    corner_offsets: IntArray,
-    side_frontage: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
+def _extents(xy: FloatArray, offsets: IntArray, sides: _Sides) -> tuple[FloatArray, FloatArray]:
     """Extents along and across the side with the longest frontage."""
+    corner_xy, corner_offsets, side_frontage = sides.corner_xy, sides.corner_offsets, sides.frontage
     _, after = ring_neighbours(corner_offsets)
     longest = np.maximum.reduceat(side_frontage, corner_offsets[:-1])
     hit = np.flatnonzero(side_frontage == np.repeat(longest, np.diff(corner_offsets)))
@@ -209,10 +247,9 @@ def _extent(values: FloatArray, offsets: IntArray) -> FloatArray:
     return np.maximum.reduceat(values, starts) - np.minimum.reduceat(values, starts)
 
 
-def _through_lots(
-    corner_xy: FloatArray, corner_offsets: IntArray, side_frontage: FloatArray, enough: FloatArray
-) -> BoolArray:
+def _through_lots(sides: _Sides, enough: FloatArray) -> BoolArray:
     """(F,) whether two sides that face opposite ways and do not touch have frontage."""
+    corner_xy, corner_offsets, side_frontage = sides.corner_xy, sides.corner_offsets, sides.frontage
     _, after = ring_neighbours(corner_offsets)
     size = np.diff(corner_offsets)
     parcel = np.repeat(np.arange(len(size)), size)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,42 +9,34 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.layout import ON_OBSTACLE, EdgeKind, Layout
-from urban_processing.mesh.planar import OUTSIDE, FloatArray
+from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
 from urban_processing.rights_of_way import RightsOfWay
 from urban_processing.rights_of_way.lay_out import CLASSES
-from urban_processing.schema import ColumnType, layer
+from urban_processing.schema import (
+    BOUNDARY,
+    INPUT_BOUNDARY,
+    JUNCTIONS,
+    METRICS,
+    NET_PARCELS,
+    OBSTACLES,
+    PARCELS,
+    RIGHT_OF_WAY,
+    STREETS,
+    Layer,
+)
 from urban_processing.streets.classes import NodeKind
+from urban_processing.tables import (
+    Table,
+    issue_table,
+    make_table,
+    numbers,
+    objects,
+    provenance_table,
+    to_map,
+)
 
 NODE_KIND_NAMES = {NodeKind.JUNCTION: "junction", NodeKind.END: "end", NodeKind.ENTRY: "entry"}
-
-
-@dataclass(frozen=True, eq=False)
-class Table:
-    """Columns of one length, in the order of the schema, and a geometry in map coordinates.
-
-    Missing values are NaN in columns of numbers (a column of whole numbers that may be
-    missing is float64), ``None`` in geometries.
-    """
-
-    columns: dict[str, npt.NDArray[Any]]
-    geometry: npt.NDArray[np.object_] | None = None
-
-    def __post_init__(self) -> None:
-        """Check that all columns have one length."""
-        lengths = {len(c) for c in self.columns.values()}
-        if self.geometry is not None:
-            lengths.add(len(self.geometry))
-        if len(lengths) != 1:
-            raise ValueError(f"The columns of a table have different lengths: {sorted(lengths)}.")
-
-    def __len__(self) -> int:
-        """Return the number of rows."""
-        return len(next(iter(self.columns.values())))
-
-    def __getitem__(self, column: str) -> npt.NDArray[Any]:
-        """Return the values of a column."""
-        return self.columns[column]
 
 
 def layout_tables(layout: Layout, *, measures: LayoutMeasures | None = None) -> dict[str, Table]:
@@ -73,9 +61,9 @@ def layout_tables(layout: Layout, *, measures: LayoutMeasures | None = None) -> 
         tables["net_parcels"] = net_parcel_table(layout, known.rights_of_way)
     return {
         **tables,
-        "issues": issue_table(layout),
+        "issues": issue_table(layout.issues, layout.frame),
         "metrics": metric_table(measure(layout, measures=known)),
-        "provenance": provenance_table(layout),
+        "provenance": provenance_table(layout.history),
     }
 
 
@@ -83,8 +71,8 @@ def parcel_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
     """Return one row for each parcel; parcel_id is the face's number plus one."""
     known = LayoutMeasures(layout) if measures is None else measures
     p, n = known.parcels, layout.mesh.n_faces
-    return _table(
-        "parcels",
+    return make_table(
+        PARCELS,
         {
             "parcel_id": np.arange(1, n + 1),
             "part": layout.face_part,
@@ -114,8 +102,8 @@ def street_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
     """Return one row for each network edge, rim included."""
     net = (LayoutMeasures(layout) if measures is None else measures).network
     number = np.where(net.node_number > 0, net.node_number, np.nan)
-    return _table(
-        "streets",
+    return make_table(
+        STREETS,
         {
             "edge_id": np.arange(1, net.n_edges + 1),
             "street_id": net.edge_street + 1,
@@ -137,8 +125,8 @@ def junction_table(layout: Layout, *, measures: LayoutMeasures | None = None) ->
     net = (LayoutMeasures(layout) if measures is None else measures).network
     at = np.flatnonzero(net.node_number)
     xy = layout.mesh.xy[net.node_vertex[at]] + np.asarray(layout.frame.origin)
-    return _table(
-        "junctions",
+    return make_table(
+        JUNCTIONS,
         {
             "junction_id": net.node_number[at],
             "part": net.node_part[at],
@@ -166,7 +154,7 @@ def boundary_table(layout: Layout) -> Table:
         (shells if mesh.loop_area[i] < 0 else holes).append((part, ring))
     shells.sort(key=lambda s: (s[0], -s[1].area))
     polygons = [_with_holes(shell, [h for q, h in holes if q == part]) for part, shell in shells]
-    return _area_table("boundary", np.array([part for part, _ in shells]), polygons)
+    return _area_table(BOUNDARY, np.array([part for part, _ in shells]), polygons)
 
 
 def _with_holes(shell: shapely.Polygon, holes: list[shapely.Polygon]) -> shapely.Polygon:
@@ -178,34 +166,34 @@ def _with_holes(shell: shapely.Polygon, holes: list[shapely.Polygon]) -> shapely
 
 def input_boundary_table(layout: Layout) -> Table:
     """Return the polygons as given, before repair and simplification."""
-    polygons = _shifted(layout.input_parts, layout)
-    return _area_table("input_boundary", np.arange(len(polygons)), polygons)
+    polygons = to_map(layout.input_parts, layout.frame)
+    return _area_table(INPUT_BOUNDARY, np.arange(len(polygons)), polygons)
 
 
 def right_of_way_table(layout: Layout, streets: RightsOfWay) -> Table:
     """Return the right-of-way: one polygon for each connected piece of one class."""
-    return _table(
-        "right_of_way",
+    return make_table(
+        RIGHT_OF_WAY,
         {
             "class": [CLASSES[k].value for k in streets.rank.tolist()],
             "part": streets.part,
             "area_m2": shapely.area(streets.polygons),
         },
-        _shifted(streets.polygons, layout),
+        to_map(streets.polygons, layout.frame),
     )
 
 
 def net_parcel_table(layout: Layout, streets: RightsOfWay) -> Table:
     """Return what is left of each parcel; those of which nothing is left are not in it."""
     face = np.flatnonzero(~shapely.is_missing(streets.net))
-    return _table(
-        "net_parcels",
+    return make_table(
+        NET_PARCELS,
         {
             "parcel_id": face + 1,
             "part": layout.face_part[face],
             "area_m2": streets.net_area[face],
         },
-        _shifted(streets.net[face], layout),
+        to_map(streets.net[face], layout.frame),
     )
 
 
@@ -221,90 +209,22 @@ def obstacle_table(layout: Layout) -> Table:
     last = len(np.unique(layout.face_part)) - 1
     lowest = np.full(len(layout.obstacles), last)
     np.minimum.at(lowest, obstacle, part[edge])
-    return _area_table("obstacles", lowest, _shifted(layout.obstacles, layout))
-
-
-def issue_table(layout: Layout) -> Table:
-    """Return what could not be done, and what the user should know."""
-    issues = layout.issues
-    return _table(
-        "issues",
-        {
-            "part": _numbers([i.part for i in issues]),
-            "parcel_id": _numbers([i.parcel_id for i in issues]),
-            "code": [i.code for i in issues],
-            "message": [i.message for i in issues],
-            "value": _numbers([i.value for i in issues]),
-            "limit": _numbers([i.limit for i in issues]),
-        },
-        _shifted([i.geometry for i in issues], layout),
-    )
+    return _area_table(OBSTACLES, lowest, to_map(layout.obstacles, layout.frame))
 
 
 def metric_table(metrics: tuple[Metric, ...]) -> Table:
     """Return metrics as a table; part and value are NaN where they are empty."""
-    return _table(
-        "metrics",
+    return make_table(
+        METRICS,
         {
-            "part": _numbers([m.part for m in metrics]),
+            "part": numbers([m.part for m in metrics]),
             "metric": [m.metric for m in metrics],
-            "value": _numbers([m.value for m in metrics]),
+            "value": numbers([m.value for m in metrics]),
             "unit": [m.unit for m in metrics],
         },
     )
 
 
-def provenance_table(layout: Layout) -> Table:
-    """Return the steps that made the layout, oldest first."""
-    steps = layout.history
-    return _table(
-        "provenance",
-        {
-            "step": np.arange(1, len(steps) + 1),
-            "algorithm": [s.algorithm for s in steps],
-            "parameters": [json.dumps(dict(s.parameters), ensure_ascii=False) for s in steps],
-            "seed": [s.seed for s in steps],
-            "version": [s.version for s in steps],
-            "input_sha256": [s.input_sha256 for s in steps],
-            "seconds": [s.seconds for s in steps],
-            "results": [json.dumps(dict(s.results)) for s in steps],
-            "part": np.full(len(steps), np.nan),
-        },
-    )
-
-
-def _area_table(name: str, part: npt.ArrayLike, polygons: Any) -> Table:
-    geometry = _objects(polygons)
-    return _table(name, {"part": part, "area_m2": shapely.area(geometry)}, geometry)
-
-
-def _table(
-    name: str, values: Mapping[str, Any], geometry: npt.NDArray[np.object_] | None = None
-) -> Table:
-    """Put the values into the order and the types of the schema."""
-    columns: dict[str, npt.NDArray[Any]] = {}
-    for column in layer(name).columns:
-        given = values[column.name]
-        if column.dtype is ColumnType.TEXT:
-            columns[column.name] = _objects(np.asarray(given, dtype=object).tolist())
-        elif column.dtype is ColumnType.INTEGER and column.nullable:
-            columns[column.name] = np.asarray(given, dtype=np.float64)
-        else:
-            columns[column.name] = np.asarray(given, dtype=column.dtype.value)
-    return Table(columns, geometry)
-
-
-def _numbers(values: Sequence[float | None]) -> FloatArray:
-    return np.array([math.nan if v is None else v for v in values], dtype=np.float64)
-
-
-def _objects(values: Any) -> npt.NDArray[np.object_]:
-    out = np.empty(len(values), dtype=object)
-    out[:] = list(values)
-    return out
-
-
-def _shifted(geometries: Any, layout: Layout) -> npt.NDArray[np.object_]:
-    """Geometries in map coordinates; ``None`` stays."""
-    origin = np.asarray(layout.frame.origin)
-    return np.asarray(shapely.transform(_objects(geometries), lambda xy: xy + origin))
+def _area_table(layer: Layer, part: npt.ArrayLike, polygons: Any) -> Table:
+    geometry = objects(polygons)
+    return make_table(layer, {"part": part, "area_m2": shapely.area(geometry)}, geometry)

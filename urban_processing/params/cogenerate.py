@@ -10,6 +10,7 @@ from typing import Annotated
 from urban_processing.params.base import Naming, Param, Params
 from urban_processing.params.dimensions import unfit_dimensions
 from urban_processing.params.rules import RULES, Preset, Rules
+from urban_processing.params.subdivide import STRATEGY_LABELS, Strategy
 from urban_processing.street_rules import StreetRules
 
 
@@ -169,6 +170,27 @@ class CogenerateParams(Params):
             group=_WIDTHS,
         ),
     ] = StreetRules.turning_radius
+    strategy: Annotated[
+        Strategy,
+        Param(
+            label="Strategy of the last levels",
+            help="How the blocks between streets become parcels in the end: by streamlines like "
+            "all levels, or by another strategy of subdivision.",
+            group=_SHAPE,
+            labels=STRATEGY_LABELS,
+        ),
+    ] = Strategy.STREAMLINE
+    last_levels: Annotated[
+        int,
+        Param(
+            label="Number of last levels",
+            help="How many levels another strategy than streamlines stands for; each halves the "
+            "parcels once.",
+            minimum=1,
+            maximum=8,
+            group=_SHAPE,
+        ),
+    ] = 1
     optimize: Annotated[
         bool,
         Param(
@@ -413,6 +435,11 @@ class CogenerateParams(Params):
             problems.append(f"Give {area} (m²) or {number} (a number): one of the two is needed.")
         if self.min_area is not None and self.parcels is not None:
             problems.append(f"Give {area} or {number}, not both.")
+        if self.parcels is not None and self.strategy is not Strategy.STREAMLINE:
+            problems.append(
+                f"{called('strategy')} {self.strategy} does not count parcels: give {area} instead "
+                f"of {number}."
+            )
         if self.weights == (0.0, 0.0, 0.0):
             size, shape, access = map(called, ("weight_size", "weight_regularity", "weight_access"))
             problems.append(

@@ -39,11 +39,22 @@ class CornerLots(enum.StrEnum):
     STREET_LENGTH = "street-length"
 
 
+STRATEGY_LABELS = {
+    "skeleton": "Rows along the streets (skeleton)",
+    "obb": "Oriented boxes",
+    "hybrid": "Rows along the streets, boxes within",
+    "streamline": "Streamlines of a cross field",
+}
+"""Readable names of strategies."""
+
 MAX_OVER_MIN = 2.5
 """Largest area over the smallest one, where it is not given."""
 
 WIDTH_SHARES = (0.6, 1.2)
 """Smallest and largest width over √(smallest area), where they are not given."""
+
+SNAP_SHARE = 0.1
+"""Snapping distance over √(smallest area), where it is not given."""
 
 _SIZE, _SHAPE, _SKELETON = "Size", "Shape", "Rows of parcels"
 
@@ -60,12 +71,7 @@ class SubdivideParams(Params):
             "(obb), rows around boxes (hybrid), or cuts along a cross field (streamline).",
             group=_SIZE,
             per_feature=True,
-            labels={
-                "skeleton": "Rows along the streets (skeleton)",
-                "obb": "Oriented boxes",
-                "hybrid": "Rows along the streets, boxes within",
-                "streamline": "Streamlines of a cross field",
-            },
+            labels=STRATEGY_LABELS,
         ),
     ] = Strategy.SKELETON
     min_area: Annotated[
@@ -193,7 +199,7 @@ class SubdivideParams(Params):
         Param(
             label="Snapping distance",
             help="A cut this near to a vertex of the block's contour goes through it; by default "
-            "0.1·√(smallest parcel).",
+            f"{SNAP_SHARE:g}·√(smallest parcel).",
             unit="m",
             minimum=0,
             advanced=True,

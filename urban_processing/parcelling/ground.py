@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.blocks.model import BlockRings
+from urban_processing.blocks.model import BlockRings, ragged_rows
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.site import FINE_GRID as FINE_GRID
 
 UintArray = npt.NDArray[np.uint64]
-
-FINE_GRID = 2.0**-28
-"""Spacing in metres of the grid that points added by subdivision are kept on. On the grid of all
-other coordinates, 256 times as coarse, a point on the edge of a block would lie so far beside
-it that areas of a small block's parcels no longer add up to 1e-9 of its own. Coordinates on
-it, too, are shifted to the map and back without loss."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +44,13 @@ class Ground:
     def __len__(self) -> int:
         """Return the number of polygons."""
         return len(self.lineage)
+
+    def of(self, rows: IntArray) -> Ground:
+        """Return some of the polygons."""
+        rings, edges = self.rings.of(rows)
+        return Ground(
+            rings, self.access[edges], self.width[edges], self.street[edges], self.lineage[rows]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +85,10 @@ class Rules:
     by_length: BoolArray
     snap: FloatArray
     corner: FloatArray
+
+    def of(self, rows: IntArray) -> Rules:
+        """Return the rules of some polygons."""
+        return Rules(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,3 +150,61 @@ class Pieces:
             ),
             dtype=object,
         )
+
+
+def sort_faces(pieces: Pieces) -> Pieces:
+    """Put faces into the order of their blocks; those of one block stay in theirs."""
+    order = np.argsort(pieces.block, kind="stable")
+    rings = ragged_rows(np.searchsorted(pieces.face, np.arange(pieces.n_faces + 1)), order)
+    edges = ragged_rows(pieces.offsets, rings)
+    size = np.diff(pieces.offsets)[rings]
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return Pieces(
+        xy=pieces.xy,
+        vertex=pieces.vertex[edges],
+        offsets=np.append(0, np.cumsum(size)),
+        face=rank[pieces.face[rings]],
+        access=pieces.access[edges],
+        block=pieces.block[order],
+        lineage=pieces.lineage[order],
+        level=pieces.level[order],
+        patio=pieces.patio[order],
+    )
+
+
+def join_parts(parts: Sequence[tuple[IntArray, Pieces]], ground: Ground) -> Pieces:
+    """Join pieces of some polygons of the ground each to pieces of all of it.
+
+    Parameters
+    ----------
+    parts
+        Polygons of the ground, each of them in one part, and the pieces of ``ground.of`` these.
+    ground
+        The whole.
+    """
+    n = len(ground.rings.xy)
+    added = [pieces.xy[len(ground.of(rows).rings.xy) :] for rows, pieces in parts]
+    edge_of = [ground.rings.of(rows)[1] for rows, _ in parts]
+    first_added = n + np.append(0, np.cumsum([len(xy) for xy in added]))
+    vertex, face, n_faces, n_edges = [], [], 0, 0
+    offsets = [np.zeros(1, dtype=np.int64)]
+    for k, (_, pieces) in enumerate(parts):
+        own = np.append(edge_of[k], np.arange(first_added[k], first_added[k + 1]))
+        vertex.append(own[pieces.vertex])
+        face.append(pieces.face + n_faces)
+        offsets.append(pieces.offsets[1:] + n_edges)
+        n_faces, n_edges = n_faces + pieces.n_faces, n_edges + len(pieces.vertex)
+    return sort_faces(
+        Pieces(
+            xy=np.concatenate([ground.rings.xy, *added]),
+            vertex=np.concatenate(vertex),
+            offsets=np.concatenate(offsets),
+            face=np.concatenate(face),
+            access=np.concatenate([pieces.access for _, pieces in parts]),
+            block=np.concatenate([rows[pieces.block] for rows, pieces in parts]),
+            lineage=np.concatenate([pieces.lineage for _, pieces in parts]),
+            level=np.concatenate([pieces.level for _, pieces in parts]),
+            patio=np.concatenate([pieces.patio for _, pieces in parts]),
+        )
+    )

@@ -1,1 +1,1 @@
-"""Parcels that stay themselves through edits (Vanegas 2012, section 5)."""
+"""What parcels and blocks were before an edit, and what they are after it (Vanegas 2012, 5)."""

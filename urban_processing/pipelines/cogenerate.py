@@ -11,16 +11,19 @@ import numpy as np
 
 from urban_processing.errors import InfeasibleError
 from urban_processing.land import default_tolerance
-from urban_processing.layout import Layout, Step
+from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.optimization.optimize import optimize_geometry
 from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.params.subdivide import Strategy, SubdivideParams
 from urban_processing.pipelines.dimensions import check_dimensions, missed_dimensions
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.ground import land_area, lay_ground, settle_islands
+from urban_processing.pipelines.last_levels import divide_street_blocks
 from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas, set_remnants_aside
@@ -50,6 +53,9 @@ MOST_PARCELS = 2_000_000
 LEVELS_SHARE, RECUT_SHARE, PRUNED_SHARE = 0.6, 0.6, 0.7
 """Share of the levels in the time of a run; of cutting again, and of the clean-up of streets, in
 the time after them."""
+
+TOO_LARGE = 4.0
+"""Parcels above so many smallest ones are cut along streamlines after another strategy."""
 
 SECONDS_PER_PARCEL = 2.6e-3
 """For the estimate that is given before a long run; one core of a common machine."""
@@ -138,6 +144,9 @@ def cogenerate(site: Site, params: CogenerateParams, progress: Progress = SILENT
         done = math.log2(state.layout.mesh.n_faces + 1) / math.log2(goal + 2)
         levels.update(min(done, 1.0) ** 3, _message(state))
         state = step(state)
+    if params.strategy is not Strategy.STREAMLINE:
+        levels.update(1.0, "Dividing the blocks")
+        state = divide_blocks(state)
     levels.update(1.0, _message(state))
     layout, results = finish(state, progress.slice(LEVELS_SHARE, 1.0))
     progress.update(1.0)
@@ -198,7 +207,7 @@ def begin(site: Site, params: CogenerateParams) -> State:
     state = State(
         layout=layout,
         params=params,
-        min_area=min_area,
+        min_area=min_area * _coarser(params),
         active=np.ones(layout.mesh.n_faces, dtype=bool),
         quota=quota,
     )
@@ -251,6 +260,39 @@ def _levels_left(state: State) -> int:
         return math.ceil(math.log2(int(state.quota[faces].max())))
     largest = float(state.layout.mesh.face_area[faces].max())
     return max(1, math.ceil(math.log2(largest / (MEAN_OVER_MIN * state.min_area))))
+
+
+def divide_blocks(state: State) -> State:
+    """The last levels by another strategy: divide the blocks, then reach every parcel again.
+
+    What it leaves too large goes on being cut along streamlines.
+    """
+    params = state.params
+    min_area = state.min_area / _coarser(params)
+    layout = state.layout.replace(min_area=min_area)
+    bounds = SubdivideParams(
+        strategy=params.strategy,
+        min_area=min_area,
+        max_area=2.0 * min_area,
+        seed=params.seed,
+    )
+    layout = divide_street_blocks(layout, bounds)
+    after = dataclasses.replace(
+        state,
+        layout=layout,
+        min_area=min_area,
+        active=layout.mesh.face_area > TOO_LARGE * min_area,
+        level=state.level + params.last_levels,
+    )
+    after = dataclasses.replace(after, layout=_with_streets(after, layout))
+    while not after.finished:
+        after = step(after)
+    return after
+
+
+def _coarser(params: CogenerateParams) -> float:
+    """How many smallest parcels the smallest one is that streamlines leave to another strategy."""
+    return 1.0 if params.strategy is Strategy.STREAMLINE else 2.0**params.last_levels
 
 
 def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str, float]]:

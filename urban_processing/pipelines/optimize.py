@@ -8,11 +8,12 @@ import time
 
 import numpy as np
 
-from urban_processing.layout import Layout, Step
+from urban_processing.layout import Layout
 from urban_processing.optimization.optimize import Optimized, optimize_geometry
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines.findings import CUT_OFF, SWALLOWED, right_of_way_findings
 from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.site import AREA_ROUNDING, Issue

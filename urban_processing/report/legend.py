@@ -14,7 +14,6 @@ from matplotlib.patheffects import Normal, withStroke
 
 from urban_processing.errors import ParameterError
 from urban_processing.mesh.corners import IRREGULAR
-from urban_processing.metrics.tables import Table
 from urban_processing.report.palette import (
     FAINT,
     FIXED_CASING,
@@ -28,6 +27,7 @@ from urban_processing.report.palette import (
     Scale,
 )
 from urban_processing.schema import PARCELS
+from urban_processing.tables import Table
 
 LEGEND_SHARE = 0.74
 """Share of the width of the map that the legend may take; the scale bar has the rest."""
@@ -97,20 +97,13 @@ def legend_entries(
     tables: dict[str, Table], colour_by: str | None, colours: tuple[str, str]
 ) -> list[Patch | Line2D]:
     """Return what the map shows, with numbers; `colours` are those of streets."""
-    parcels = tables["parcels"]
-    triangle = parcels["sides"] == 3
-    irregular = (parcels["irregularity"] > IRREGULAR) & ~triangle
     n_ends = int((tables["junctions"]["kind"] == "end").sum())
     street, casing = colours
     entries: list[Patch | Line2D] = []
     if colour_by is None:
-        entries.append(_swatch(PARCEL, _counted(len(parcels), "parcel")))
-        if irregular.any():
-            entries.append(_swatch(IRREGULAR_RAMP(0.6), f"{int(irregular.sum()):,} irregular"))
-        if triangle.any():
-            entries.append(_swatch(TRIANGLE, _counted(int(triangle.sum()), "triangle")))
+        entries += parcel_entries(tables["parcels"])
     if "right_of_way" in tables:
-        entries.append(_swatch(SURFACE, "Right-of-way"))
+        entries.append(swatch(SURFACE, "Right-of-way"))
     cased = [withStroke(linewidth=4.4, foreground=casing), Normal()]
     entries.append(Line2D([], [], color=street, lw=3, label="Street", path_effects=cased))
     given = ~np.isnan(tables["streets"]["fixed_id"])
@@ -120,7 +113,7 @@ def legend_entries(
             Line2D([], [], color=FIXED_STREET, lw=3, label="Given street", path_effects=lined)
         )
     if "obstacles" in tables:
-        entries.append(_swatch(OBSTACLE, "Obstacle"))
+        entries.append(swatch(OBSTACLE, "Obstacle"))
     n_entries = int((tables["junctions"]["kind"] == "entry").sum())
     if n_entries:
         mark = Line2D([], [], color="white", marker="^", markeredgecolor=INK, ls="", ms=6)
@@ -130,6 +123,18 @@ def legend_entries(
         dot = Line2D([], [], color=street, marker="o", markeredgecolor=casing, ls="", ms=5)
         dot.set_label(_counted(n_ends, "street end"))
         entries.append(dot)
+    return entries
+
+
+def parcel_entries(parcels: Table) -> list[Patch]:
+    """Return the entries for parcels in the colours of `parcel_colours`."""
+    triangle = parcels["sides"] == 3
+    irregular = (parcels["irregularity"] > IRREGULAR) & ~triangle
+    entries = [swatch(PARCEL, _counted(len(parcels), "parcel"))]
+    if irregular.any():
+        entries.append(swatch(IRREGULAR_RAMP(0.6), f"{int(irregular.sum()):,} irregular"))
+    if triangle.any():
+        entries.append(swatch(TRIANGLE, _counted(int(triangle.sum()), "triangle")))
     return entries
 
 
@@ -156,7 +161,8 @@ def draw_legend(ax: Axes, entries: list[Patch | Line2D], scale: Scale) -> None:
     )
 
 
-def _swatch(colour: Any, label: str) -> Patch:
+def swatch(colour: Any, label: str) -> Patch:
+    """Return an entry for areas of one colour."""
     return Patch(facecolor=colour, edgecolor=FAINT, linewidth=0.6, label=label)
 
 

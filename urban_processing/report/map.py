@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-import io
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 import shapely
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.path import Path as Outline
 
-from urban_processing.errors import OutputError, ParameterError
+from urban_processing.errors import ParameterError
 from urban_processing.layout import Layout
-from urban_processing.metrics.tables import Table, layout_tables
-from urban_processing.paths import map_problems
+from urban_processing.metrics.tables import layout_tables
+from urban_processing.report.figure import (
+    Extent,
+    checked,
+    extent_of,
+    frame_land,
+    new_axes,
+    outline,
+    save,
+    scale_of,
+)
 from urban_processing.report.legend import (
     draw_colour_bar,
     draw_legend,
@@ -43,32 +48,14 @@ from urban_processing.report.palette import (
     VALUE_RAMP,
     Scale,
     parcel_colours,
-    text_points,
 )
 from urban_processing.schema import PARCELS, ColumnType
+from urban_processing.tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from urban_processing.metrics import MeasuredLayout
-
-DOTS_PER_INCH = 200
-
-_REPRODUCIBLE: dict[Any, Any] = {"svg.hashsalt": "urban_processing", "svg.fonttype": "path"}
-_NO_DATES: dict[str, dict[str, Any]] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None},
-    ".pdf": {"CreationDate": None, "ModDate": None},
-}
-
-
-class MapFigure(Figure):
-    """A figure that notebooks show without a plotting backend."""
-
-    def _repr_png_(self) -> bytes:
-        buffer = io.BytesIO()
-        self.savefig(buffer, format="png", dpi=DOTS_PER_INCH / 2)
-        return buffer.getvalue()
 
 
 def plot_layout(
@@ -114,71 +101,22 @@ def plot_layout(
         If `colour_by` is no column of numbers.
     """
     _check_colour_by(colour_by)
-    target = None if path is None else _checked(Path(path))
+    target = None if path is None else checked(Path(path))
     tables = layout_tables(layout) if isinstance(layout, Layout) else layout.tables
     if ax is None:
-        ax = _new_axes(tables, title, size)
+        longer = _longer_side(tables) if size is None else size
+        ax = new_axes(_extent(tables), title=title, longer=longer)
     figure = root_figure(ax)
     _draw(ax, tables, colour_by)
     if target is not None:
-        _save(figure, target)
+        save(figure, target)
     return figure
-
-
-def _checked(path: Path) -> Path:
-    problems = map_problems(path)
-    if problems:
-        raise OutputError(problems)
-    return path
 
 
 def _check_colour_by(name: str | None) -> None:
     numbers = [c.name for c in PARCELS.columns if c.dtype is not ColumnType.TEXT]
     if name is not None and name not in numbers:
         raise ParameterError(f"colour-by must be one of {', '.join(numbers)}; got {name!r}.")
-
-
-def _save(figure: Figure, path: Path) -> None:
-    suffix = path.suffix.lower()
-    drawn = io.BytesIO()
-    with mpl.rc_context(_REPRODUCIBLE):
-        figure.savefig(drawn, format=suffix[1:], dpi=DOTS_PER_INCH, metadata=_NO_DATES[suffix])
-    try:
-        path.write_bytes(drawn.getvalue())
-    except OSError as error:
-        raise OutputError(f"The map {path} cannot be written: {error.strerror}.") from error
-
-
-def _new_axes(tables: dict[str, Table], title: str, size: float | None) -> Axes:
-    """Make a figure in the shape of the land, with strips for the title and the legend."""
-    x0, y0, x1, y1 = _extent(tables)
-    longer = _longer_side(tables) if size is None else size
-    factor = longer / max(x1 - x0, y1 - y0)
-    text = text_points(longer) / 8
-    margin, head, foot = 0.2, 0.4 * text if title else 0.0, 0.42 * text
-    width = max(factor * (x1 - x0), 5.5) + 2 * margin
-    height = factor * (y1 - y0) + 2 * margin + head + foot
-    figure = MapFigure(figsize=(width, height), facecolor="white")
-    FigureCanvasAgg(figure)
-    ax = figure.add_axes(
-        (
-            margin / width,
-            (foot + margin) / height,
-            1 - 2 * margin / width,
-            1 - (2 * margin + head + foot) / height,
-        )
-    )
-    if title:
-        figure.text(
-            margin / width,
-            1 - 0.16 / height,
-            title,
-            va="top",
-            size=13 * text,
-            weight="bold",
-            color=INK,
-        )
-    return ax
 
 
 def _longer_side(tables: dict[str, Table]) -> float:
@@ -190,13 +128,8 @@ def _longer_side(tables: dict[str, Table]) -> float:
 
 
 def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
-    x0, y0, x1, y1 = _extent(tables)
-    ax.set_aspect("equal")
-    pad = 0.012 * max(x1 - x0, y1 - y0)
-    ax.set_xlim(x0 - pad, x1 + pad)
-    ax.set_ylim(y0 - pad, y1 + pad)
-    ax.axis("off")
-    scale = _scale(ax, tables)
+    frame_land(ax, _extent(tables))
+    scale = scale_of(ax, tables["parcels"]["area_m2"])
     _draw_parcels(ax, tables["parcels"], scale, colour_by)
     if "right_of_way" in tables:
         _draw_right_of_way(ax, tables["right_of_way"])
@@ -211,25 +144,13 @@ def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
         draw_colour_bar(ax, colour_by, scale)
 
 
-def _extent(tables: dict[str, Table]) -> tuple[float, float, float, float]:
-    x0, y0, x1, y1 = shapely.total_bounds(tables["boundary"].geometry)
-    return float(x0), float(y0), float(x1), float(y1)
-
-
-def _scale(ax: Axes, tables: dict[str, Table]) -> Scale:
-    """Points on paper for each metre on the ground, at equal aspect."""
-    box = ax.get_window_extent()
-    width, height = box.width * 72 / root_figure(ax).dpi, box.height * 72 / root_figure(ax).dpi
-    left, right = ax.get_xlim()
-    bottom, top = ax.get_ylim()
-    points = min(width / (right - left), height / (top - bottom))
-    side = float(np.sqrt(np.median(tables["parcels"]["area_m2"])))
-    return Scale(points, side, text_points(max(width, height) / 72))
+def _extent(tables: dict[str, Table]) -> Extent:
+    return extent_of(tables["boundary"].shapes)
 
 
 def _draw_rim(ax: Axes, boundary: Table, scale: Scale) -> None:
     """Draw the land's outline and its holes, where no street covers them."""
-    outlines = [_outline(polygon) for polygon in _polygons(boundary)]
+    outlines = [outline(polygon) for polygon in _polygons(boundary)]
     ax.add_collection(
         PathCollection(
             outlines,
@@ -246,7 +167,7 @@ def _draw_right_of_way(ax: Axes, right_of_way: Table) -> None:
     """Draw the land that streets take, true to scale, below the streets themselves."""
     ax.add_collection(
         PathCollection(
-            [_outline(polygon) for polygon in _geometry(right_of_way)],
+            [outline(polygon) for polygon in right_of_way.shapes],
             facecolors=SURFACE,
             edgecolors="none",
             zorder=1.3,
@@ -255,13 +176,13 @@ def _draw_right_of_way(ax: Axes, right_of_way: Table) -> None:
 
 
 def _polygons(table: Table) -> npt.NDArray[np.object_]:
-    parts = shapely.get_parts(_geometry(table))
+    parts = shapely.get_parts(table.shapes)
     return np.asarray(parts, dtype=object)
 
 
 def _draw_parcels(ax: Axes, parcels: Table, scale: Scale, colour_by: str | None) -> None:
     collection = PathCollection(
-        [_outline(polygon) for polygon in _geometry(parcels)],
+        [outline(polygon) for polygon in parcels.shapes],
         facecolors=parcel_colours(parcels),
         edgecolors=OUTLINE,
         linewidths=scale.outline,
@@ -285,22 +206,16 @@ def _value_range(values: npt.NDArray[Any]) -> Normalize:
     return Normalize(low, high if high > low else low + 1.0)
 
 
-def _outline(polygon: shapely.Polygon) -> Outline:
-    rings = [polygon.exterior, *polygon.interiors]
-    paths = [Outline(shapely.get_coordinates(ring), closed=True) for ring in rings]
-    return paths[0] if len(paths) == 1 else Outline.make_compound_path(*paths)
-
-
 def _draw_streets(
     ax: Axes, streets: Table, junctions: Table, scale: Scale, colours: tuple[str, str]
 ) -> None:
     """All casings below all fills, so that crossings are open."""
-    lines = [shapely.get_coordinates(line) for line in _geometry(streets)]
+    lines = [shapely.get_coordinates(line) for line in streets.shapes]
     if not lines:
         return
     width = scale.street(streets["width_m"])
-    ends = shapely.get_coordinates(_geometry(junctions)[junctions["kind"] == "end"])
-    entries = shapely.get_coordinates(_geometry(junctions)[junctions["kind"] == "entry"])
+    ends = shapely.get_coordinates(junctions.shapes[junctions["kind"] == "end"])
+    entries = shapely.get_coordinates(junctions.shapes[junctions["kind"] == "entry"])
     given = ~np.isnan(streets["fixed_id"])
     for fill, margin, zorder in ((False, 2 * scale.casing, 2), (True, 0.0, 3)):
         colour = colours[0 if fill else 1]
@@ -334,13 +249,9 @@ def _draw_streets(
 def _draw_obstacles(ax: Axes, obstacles: Table) -> None:
     ax.add_collection(
         PathCollection(
-            [_outline(polygon) for polygon in _polygons(obstacles)],
+            [outline(polygon) for polygon in _polygons(obstacles)],
             facecolors=OBSTACLE,
             edgecolors="none",
             zorder=0.5,
         )
     )
-
-
-def _geometry(table: Table) -> npt.NDArray[np.object_]:
-    return np.empty(0, dtype=object) if table.geometry is None else table.geometry

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 
 from urban_processing.mesh.corners import IRREGULAR
-from urban_processing.metrics.tables import Table
+from urban_processing.tables import Table
 
 STRONGLY_IRREGULAR = 0.5
 """Irregularity from which the tint has its full strength."""
@@ -20,6 +20,7 @@ INK, FAINT = "#4a463f", "#8c8579"
 PARCEL, OUTLINE = "#f6f4ee", "#aaa396"
 TRIANGLE = "#b6a0d6"
 SURFACE = "#d9d5cb"
+BLOCK, PATIO = "#ece7da", "#d5e3c6"
 IRREGULAR_RAMP = LinearSegmentedColormap.from_list("irregular", ["#f9dcd0", "#ee8f76", "#d0342c"])
 VALUE_RAMP = LinearSegmentedColormap.from_list(
     "value", ["#f7f3dc", "#b9dcc0", "#63b3bd", "#2f7aa8", "#2b4a86"]

@@ -82,7 +82,7 @@ def rights_of_way_of_lines(
         shapely.point_on_surface(cells), predicate="intersects"
     )
     blocks = cells[cell]
-    segments, line = _segments(edges, centrelines, widths)
+    segments, line = segments_on(edges, centrelines, widths)
     near, block = shapely.STRtree(blocks).query(
         shapely.points(segments.mean(axis=1)), predicate="dwithin", distance=BESIDE
     )
@@ -90,16 +90,16 @@ def rights_of_way_of_lines(
     surfaces = street_surfaces(
         blocks,
         StreetSides(block, segments[near], widths[of], ranks[of]),
-        _heads(blocks, rims, segments, ranks[line], turning_radius),
+        turning_heads(blocks, rims, segments, ranks[line], turning_radius),
         corner_radius=corner_radius,
     )
     return blocks, partition(blocks, edges, surfaces, block=np.arange(len(blocks)), part=part)
 
 
-def _segments(
+def segments_on(
     edges: Geometries, centrelines: Sequence[shapely.LineString], width: FloatArray
 ) -> tuple[FloatArray, IntArray]:
-    """Pieces of edges that lie on a centreline, and which: the widest of several."""
+    """(S, 2, 2) pieces of edges on centrelines, and (S,) which line: the widest of several."""
     pieces, _ = line_segments(edges)
     piece, line = shapely.STRtree(np.asarray(centrelines, dtype=object)).query(
         shapely.points(pieces.mean(axis=1)), predicate="dwithin", distance=BESIDE
@@ -110,10 +110,10 @@ def _segments(
     return pieces[piece[chosen]], line[chosen]
 
 
-def _heads(
+def turning_heads(
     blocks: Geometries, rims: Geometries, segments: FloatArray, rank: IntArray, radius: float
 ) -> Circles:
-    """Circles where a single segment ends inside the land."""
+    """Circles where a single one of (S, 2, 2) segments ends inside the land, not at its rims."""
     ends = segments.reshape(-1, 2)
     places, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
     at = shapely.points(places)

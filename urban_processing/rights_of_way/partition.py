@@ -74,15 +74,57 @@ def partition(
     block, part
         (F,) block and part of each parcel.
     """
-    faces, owner, inside = _faces(parcels, np.append(edges, surfaces.outlines))
-    rank = _classes(inside, block[owner], surfaces)
-    loose, cut_off = _cut_off(faces, owner, rank == _NO_CLASS, shapely.area(parcels))
-    rank = _joined(faces, rank, loose)
-    street = rank != _NO_CLASS
+    cut = cut_out(parcels, edges, surfaces, block=block)
+    loose, cut_off = _cut_off(cut.faces, cut.owner, cut.net, shapely.area(parcels))
+    cut = cut.joined(loose)
     net = np.full(len(parcels), None, dtype=object)
-    net[owner[~street]] = canonical_rings(faces[~street])
-    polygons, key = _dissolved(faces[street], np.column_stack([part[owner[street]], rank[street]]))
-    return RightsOfWay(polygons, key[:, 1], key[:, 0], net, cut_off)
+    net[cut.owner[cut.net]] = canonical_rings(cut.faces[cut.net])
+    polygons, rank, of_part = cut.rights_of_way(part)
+    return RightsOfWay(polygons, rank, of_part, net, cut_off)
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Faces between the boundaries of parcels and of street surfaces.
+
+    Parameters
+    ----------
+    faces
+        (n,) polygons that tile the parcels.
+    owner
+        (n,) parcel of each.
+    rank
+        (n,) class that a face is right-of-way of; a number above all classes where it is none.
+    """
+
+    faces: Geometries
+    owner: IntArray
+    rank: IntArray
+
+    @property
+    def net(self) -> BoolArray:
+        """(n,) faces that no street takes."""
+        return np.asarray(self.rank == _NO_CLASS)
+
+    def joined(self, loose: BoolArray) -> Cut:
+        """Give loose faces to the right-of-way with which they share the longest edge."""
+        return Cut(self.faces, self.owner, _joined(self.faces, self.rank, loose))
+
+    def rights_of_way(self, part: IntArray) -> tuple[Geometries, IntArray, IntArray]:
+        """Unite the right-of-way: polygons, class and part of each; `part` is that of parcels."""
+        street = ~self.net
+        keys = np.column_stack([part[self.owner[street]], self.rank[street]])
+        polygons, key = _dissolved(self.faces[street], keys)
+        return polygons, key[:, 1], key[:, 0]
+
+
+def cut_out(parcels: Geometries, edges: Geometries, surfaces: Surfaces, *, block: IntArray) -> Cut:
+    """Node the boundaries of parcels and street surfaces, and give out the faces between them.
+
+    The parameters are those of `partition`.
+    """
+    faces, owner, inside = _faces(parcels, np.append(edges, surfaces.outlines))
+    return Cut(faces, owner, _classes(inside, block[owner], surfaces))
 
 
 def _faces(parcels: Geometries, lines: Geometries) -> tuple[Geometries, IntArray, FloatArray]:

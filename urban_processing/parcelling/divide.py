@@ -1,0 +1,69 @@
+"""Blocks to parcels, each by its own strategy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+
+from urban_processing.params.subdivide import Patio, Strategy
+from urban_processing.parcelling.compose import ground_of_faces, replace_faces
+from urban_processing.parcelling.ground import Ground, Pieces, Rules, join_parts
+from urban_processing.parcelling.obb import divide_by_boxes
+from urban_processing.parcelling.rows import divide_in_rows
+from urban_processing.parcelling.rules import BlockRules
+from urban_processing.parcelling.streamline import divide_by_streamlines
+
+
+class _Divide(Protocol):
+    """A strategy: divides each polygon of the ground for itself."""
+
+    def __call__(self, ground: Ground, rules: Rules, *, seed: int) -> Pieces: ...
+
+
+_STRATEGIES: Mapping[str, _Divide] = {
+    Strategy.SKELETON: divide_in_rows,
+    Strategy.HYBRID: divide_in_rows,
+    Strategy.OBB: divide_by_boxes,
+    Strategy.STREAMLINE: divide_by_streamlines,
+}
+
+
+def divide(ground: Ground, wanted: BlockRules, *, seed: int) -> Pieces:
+    """Divide each polygon of the ground by its own strategy, and patios by theirs.
+
+    Polygons do not know of each other: the pieces of one do not depend on which others there
+    are, nor on their order.
+
+    Parameters
+    ----------
+    ground
+        B polygons.
+    wanted
+        B rules.
+    seed
+        Random seed.
+    """
+    parts = []
+    for strategy, run in _STRATEGIES.items():
+        rows = np.flatnonzero(wanted.strategy == strategy)
+        if len(rows):
+            rules = wanted.of(rows)
+            pieces = run(ground.of(rows), rules.rules, seed=seed)
+            parts.append((rows, _with_patios(pieces, rules, seed=seed)))
+    return join_parts(parts, ground)
+
+
+def _with_patios(pieces: Pieces, wanted: BlockRules, *, seed: int) -> Pieces:
+    """Divide the insides of perimeter blocks that are not to stay whole."""
+    for patio in Patio:
+        if patio is Patio.OPEN:
+            continue
+        faces = np.flatnonzero(pieces.patio & (wanted.patio[pieces.block] == patio))
+        if len(faces):
+            inside = ground_of_faces(pieces, faces)
+            rules = wanted.rules.of(pieces.block[faces])
+            divided = _STRATEGIES[patio](inside, rules, seed=seed)
+            pieces = replace_faces(pieces, faces, divided)
+    return pieces

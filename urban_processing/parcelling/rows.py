@@ -1,0 +1,194 @@
+"""Blocks into rows of parcels along their streets, by the straight skeleton."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from urban_processing.errors import TopologyError
+from urban_processing.hashing import uniform
+from urban_processing.mesh.corners import ring_areas
+from urban_processing.mesh.planar import IntArray
+from urban_processing.parcelling.divided import (
+    Divided,
+    Face,
+    Polygon,
+    assembled,
+    polygons_of,
+    straightened,
+    whole,
+)
+from urban_processing.parcelling.ground import Ground, Pieces, Rules
+from urban_processing.parcelling.lineage import child
+from urban_processing.parcelling.mending import Needs, beta_strips
+from urban_processing.parcelling.patios import joined, patio_faces, rows_and_patios
+from urban_processing.parcelling.plots import Plots, edges_of
+from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.slices import Slicer, rings_of_lots
+from urban_processing.parcelling.spacing import Bounds
+from urban_processing.parcelling.streets import logical_streets, sides_of_rings
+from urban_processing.parcelling.strips import Strip, alpha_strips
+from urban_processing.parcelling.tidy import divide_large, tidy
+from urban_processing.skeleton.straight import Skeleton, straight_skeleton
+
+LEAST_FRONT = 0.75
+"""Shortest front of a strip, over the smallest width."""
+
+TILED = 1e-9
+"""Share of a polygon's area that its faces may miss or hold twice."""
+
+_PATIOS = 2**32
+"""Rank of all patios among the strips of a block."""
+
+
+def divide_in_rows(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
+    """Divide polygons into rows of parcels along their streets (Vanegas 2012, section 4.2).
+
+    The straight skeleton parts a polygon into what lies nearest to each logical street; diagonal
+    ends of these strips are mended; lines from the street divide strips into parcels; what comes
+    out too small or too large is united or divided. Each parcel has frontage. With a finite
+    ``rules.offset`` rows are that deep, and what lies within is a patio.
+
+    A polygon stays whole where it is too small for two parcels, has no street side, or is so
+    nearly degenerate that its skeleton cannot be told.
+
+    Parameters
+    ----------
+    ground
+        The polygons.
+    rules
+        Bounds and style for each. ``street_access`` has no say: all parcels have access.
+    seed
+        Seed of the random displacement of lines.
+
+    Returns
+    -------
+    Pieces
+        Parcels, and patios of perimeter blocks.
+
+    References
+    ----------
+    C. A. Vanegas et al. (2012). Procedural generation of parcels in urban modeling. Computer
+    Graphics Forum 31(2), section 4.2 and algorithm 1.
+    """
+    polygons = list(polygons_of(ground))
+    parts = [_divide(polygon, rules, k, seed) for k, polygon in enumerate(polygons)]
+    pieces = assembled(ground, parts)
+    unsound = _unsound(ground, pieces)
+    if len(unsound):
+        for k in unsound.tolist():
+            parts[k] = whole(polygons[k])
+        pieces = assembled(ground, parts)
+    return pieces
+
+
+def _unsound(ground: Ground, pieces: Pieces) -> IntArray:
+    """Polygons whose faces are not valid or do not tile them."""
+    polygons = pieces.polygons()
+    valid = (
+        np.bincount(pieces.block, weights=~shapely.is_valid(polygons), minlength=len(ground)) == 0
+    )
+    tiled = np.bincount(pieces.block, weights=shapely.area(polygons), minlength=len(ground))
+    rings = ground.rings
+    area = np.bincount(
+        rings.block, weights=ring_areas(rings.xy, rings.offsets), minlength=len(ground)
+    )
+    return np.flatnonzero(~valid | (np.abs(tiled - area) > TILED * area))
+
+
+def _bounds(rules: Rules, k: int) -> Bounds:
+    return Bounds(
+        min_area=float(rules.min_area[k]),
+        max_area=float(rules.max_area[k]),
+        min_width=float(rules.min_width[k]),
+        max_width=float(rules.max_width[k]),
+        irregularity=float(rules.irregularity[k]),
+        snap=float(rules.snap[k]),
+    )
+
+
+def _divide(polygon: Polygon, rules: Rules, k: int, seed: int) -> Divided:
+    """Divide one polygon."""
+    bounds = _bounds(rules, k)
+    area = float(ring_areas(polygon.xy, polygon.offsets).sum())
+    if area < 2.0 * bounds.min_area or not any(polygon.access):
+        return whole(polygon)
+    try:
+        skeleton = straight_skeleton(polygon.xy, polygon.offsets)
+    except TopologyError:
+        return whole(polygon)
+    skeleton, patios = rows_and_patios(
+        skeleton, offset=float(rules.offset[k]), area=area, min_area=bounds.min_area
+    )
+    sheet = Sheet(skeleton.xy, skeleton.height, polygon.following)
+    needs = Needs(
+        area=bounds.min_area,
+        depth=bounds.min_area / bounds.max_width,
+        mean_depth=bounds.min_area / bounds.mean_width,
+        front=LEAST_FRONT * bounds.min_width,
+        by_length=bool(rules.by_length[k]),
+        reach=bounds.min_width,
+        snap=bounds.snap,
+    )
+    strips = _alpha_strips(sheet, polygon, skeleton, corner=float(rules.corner[k]), needs=needs)
+    inside = {edge for patio in patios for ring in patio for edge in edges_of(ring)}
+    strips, left = beta_strips(sheet, strips, needs, inside)
+    if left:
+        patios = joined(sheet, patios, [strip.ring for strip in left])
+    plots = _parcels(sheet, polygon, strips, bounds, seed)
+    tidy(plots, bounds)
+    divide_large(plots, bounds)
+    faces = [
+        Face([plots.rings[n], *plots.holes[n]], plots.lineage[n], plots.level[n])
+        for n in sorted(plots.rings)
+    ]
+    faces += patio_faces(sheet, patios, child(polygon.lineage, _PATIOS))
+    straightened(sheet, faces)
+    return Divided(polygon, sheet, faces)
+
+
+def _alpha_strips(
+    sheet: Sheet, polygon: Polygon, skeleton: Skeleton, *, corner: float, needs: Needs
+) -> list[Strip]:
+    """Return the α-strips, ranked by what does not depend on where rings begin."""
+    x, y = polygon.xy.mean(axis=0).tolist()
+    streets = [
+        street
+        for ring in sides_of_rings(sheet, polygon, skeleton.edge_face.tolist())
+        for street in logical_streets(ring, (x, y), corner=corner, reach=needs.reach)
+    ]
+    strips = alpha_strips(sheet, [face.tolist() for face in skeleton.faces], streets)
+    strips.sort(
+        key=lambda s: (
+            s.street.rim,
+            -round(s.street.length, 4),
+            round(sheet.y[s.front[0]], 4),
+            round(sheet.x[s.front[0]], 4),
+        )
+    )
+    for rank, strip in enumerate(strips):
+        strip.rank = rank
+    return strips
+
+
+def _parcels(
+    sheet: Sheet, polygon: Polygon, strips: Sequence[Strip], bounds: Bounds, seed: int
+) -> Plots:
+    """Divide each strip into parcels."""
+    parts = []
+    for strip in strips:
+        slicer = Slicer(sheet, strip, bounds)
+        lineage = child(polygon.lineage, strip.rank)
+        count = int(slicer.length / bounds.min_width) + 2
+        draws = uniform(seed, np.array([lineage], dtype=np.uint64), count)[0].tolist()
+        parts.append((strip, slicer.lots(slicer.cuts(draws)), lineage))
+    polygons: list[list[list[int]]] = []
+    seeds: list[int] = []
+    for strip, lots, lineage in parts:
+        for k, shapes in enumerate(rings_of_lots(sheet, strip, lots)):
+            polygons += shapes
+            own = child(lineage, k)
+            seeds += [own] + [child(own, j) for j in range(1, len(shapes))]
+    return Plots(sheet, polygons, seeds, polygon.access)

@@ -1,0 +1,69 @@
+"""`Subdivision`: blocks with the parcels that they were divided into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from urban_processing.blocks.model import Blocks
+from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.parcelling.ground import Pieces
+from urban_processing.parcelling.rules import BlockRules
+from urban_processing.provenance import Step
+from urban_processing.site import Issue
+
+
+@dataclass(frozen=True, eq=False)
+class Subdivision:
+    """Blocks and the parcels that they were divided into.
+
+    Parameters
+    ----------
+    blocks
+        B blocks.
+    wanted
+        Rules of each block.
+    block_key
+        (B,) hash of contour, streets and rules of each block.
+    pieces
+        The parcels: faces that tile the blocks.
+    parcel_id
+        (F,) numbers of the parcels, unique.
+    issues
+        What the blocks do not allow, parcel by parcel.
+    history
+        Steps that made it, oldest first.
+    """
+
+    blocks: Blocks
+    wanted: BlockRules
+    block_key: npt.NDArray[np.str_]
+    pieces: Pieces
+    parcel_id: IntArray
+    issues: tuple[Issue, ...]
+    history: tuple[Step, ...]
+
+    @cached_property
+    def polygons(self) -> npt.NDArray[np.object_]:
+        """(F,) the parcels as polygons in local metres."""
+        return self.pieces.polygons()
+
+    @cached_property
+    def edge_frontage(self) -> FloatArray:
+        """(N,) length of street along each edge of the rings of the parcels."""
+        pieces = self.pieces
+        after = np.arange(1, len(pieces.vertex) + 1)
+        after[pieces.offsets[1:] - 1] = pieces.offsets[:-1]
+        step = pieces.xy[pieces.vertex[after]] - pieces.xy[pieces.vertex]
+        return np.where(pieces.access, np.hypot(step[:, 0], step[:, 1]), 0.0)
+
+    @cached_property
+    def frontage(self) -> FloatArray:
+        """(F,) length in metres of the boundary of each parcel on streets."""
+        pieces = self.pieces
+        of_edge = np.repeat(pieces.face, np.diff(pieces.offsets))
+        found = np.bincount(of_edge, weights=self.edge_frontage, minlength=pieces.n_faces)
+        return np.asarray(found, dtype=np.float64)
