@@ -23,7 +23,8 @@ from parcel_grounds import (
 )
 
 from urban_processing.access_rule import reached_frontage
-from urban_processing.parcelling.compose import join_pieces, part_of_ground, part_of_rules
+from urban_processing.parcelling import obb
+from urban_processing.parcelling.ground import join_parts
 from urban_processing.parcelling.obb import divide_by_boxes
 
 NETWORKS = Path(__file__).parents[3] / "shared" / "data" / "redistributable" / "networks"
@@ -203,18 +204,27 @@ def test_blocks_are_divided_apart_as_together():
     ground = ground_of(some_blocks())
     rules = rules_of(len(ground), 100.0, street_access=0.5)
     whole = divide_by_boxes(ground, rules, seed=1)
-    halves = np.array_split(np.arange(len(ground)), 3)
-    grounds = [part_of_ground(ground, half) for half in halves]
     parts = [
-        divide_by_boxes(part, part_of_rules(rules, half), seed=1)
-        for part, half in zip(grounds, halves, strict=True)
+        (rows, divide_by_boxes(ground.of(rows), rules.of(rows), seed=1))
+        for rows in np.array_split(np.arange(len(ground)), 3)
     ]
-    joined = join_pieces(parts, [len(part.rings.xy) for part in grounds])
+    joined = join_parts(parts, ground)
     assert_tiled(joined, ground)
     np.testing.assert_array_equal(joined.lineage, whole.lineage)
     np.testing.assert_array_equal(joined.level, whole.level)
     np.testing.assert_array_equal(joined.offsets, whole.offsets)
     np.testing.assert_array_equal(joined.xy[joined.vertex], whole.xy[whole.vertex])
+
+
+def test_how_many_are_worked_on_at_once_does_not_matter(monkeypatch):
+    ground = ground_of(some_blocks())
+    rules = rules_of(len(ground), 100.0)
+    one = divide_by_boxes(ground, rules, seed=1)
+    monkeypatch.setattr(obb, "PARCELS_AT_ONCE", 100)
+    two = divide_by_boxes(ground, rules, seed=1)
+    assert_tiled(two, ground)
+    np.testing.assert_array_equal(one.lineage, two.lineage)
+    np.testing.assert_array_equal(one.xy[one.vertex], two.xy[two.vertex])
 
 
 def test_where_a_ring_starts_does_not_matter():

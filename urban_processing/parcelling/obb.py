@@ -11,8 +11,7 @@ from urban_processing.hashing import splitmix64, uniform
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.boxes import Boxes, smallest_boxes
 from urban_processing.parcelling.candidates import Contour, Faces
-from urban_processing.parcelling.compose import join_pieces, part_of_ground, part_of_rules
-from urban_processing.parcelling.ground import Ground, Pieces, Rules, UintArray
+from urban_processing.parcelling.ground import Ground, Pieces, Rules, UintArray, join_parts
 from urban_processing.parcelling.halving import Halved, halve
 from urban_processing.parcelling.line_cuts import THE_CUT
 from urban_processing.parcelling.noding import Segments, node_rings
@@ -94,13 +93,8 @@ def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     batches = _batches(ground, rules)
     if len(batches) <= 1:
         return _divide(ground, rules, seed)
-    parts = [
-        _divide(part_of_ground(ground, batch), part_of_rules(rules, batch), seed)
-        for batch in batches
-    ]
-    sizes = np.diff(ground.rings.offsets)
-    block = ground.rings.block
-    return join_pieces(parts, [int(sizes[np.isin(block, batch)].sum()) for batch in batches])
+    parts = [(rows, _divide(ground.of(rows), rules.of(rows), seed)) for rows in batches]
+    return join_parts(parts, ground)
 
 
 def _batches(ground: Ground, rules: Rules) -> list[IntArray]:
