@@ -71,7 +71,7 @@ def halve(faces: Faces, xy: FloatArray, contour: Contour) -> list[Halved]:
     will, the first is made whose pieces keep `least` and `narrowest` and have access.
     """
     left = np.ones(len(faces), dtype=bool)
-    along = view_along(faces, xy, contour, turned=False)
+    along = view_along(faces, xy, contour, turned=~left)
     options = _judged(along, left.nonzero()[0], along.snapped, SNAPPED_ALONG, contour)
     more = [(left.copy(), _second_options), (left.copy(), _last_options)]
     done = []
@@ -94,8 +94,8 @@ def _second_options(
     along: View, rows: IntArray, xy: FloatArray, contour: Contour
 ) -> list[_Options]:
     """Judge regular cuts, but for the first; `rows`: what the faces of the view are called."""
-    across = view_along(along.faces, xy, contour, turned=True)
     everyone = np.arange(len(rows))
+    across = view_along(along.faces, xy, contour, turned=everyone >= 0)
     found = [_judged(across, everyone, across.snapped, SNAPPED_ACROSS, contour)]
     for view, order in ((along, ALONG), (across, ACROSS)):
         moved = (np.abs(view.regular - view.snapped) > TOUCH).nonzero()[0]
@@ -106,14 +106,14 @@ def _second_options(
 
 def _last_options(along: View, rows: IntArray, xy: FloatArray, contour: Contour) -> list[_Options]:
     """Judge cuts by shares of the area; `rows`: what the faces of the view are called."""
-    across = view_along(along.faces, xy, contour, turned=True)
-    row, share = np.tile(np.arange(len(rows)), len(SHARES)), np.repeat(SHARES, len(rows))
-    order = BY_SHARE + 2 * np.repeat(np.arange(len(SHARES)), len(rows))
-    found = [
-        _judged(view, row, view.at_shares(row, share), order + later, contour)
-        for later, view in enumerate((along, across))
-    ]
-    return [part.called(rows) for part in found]
+    k, n = len(rows), len(SHARES)
+    twice = along.faces.take(np.tile(np.arange(k), 2))
+    turned = np.arange(2 * k) >= k
+    both = view_along(twice, xy, contour, turned=turned)
+    row, share = np.tile(np.arange(2 * k), n), np.repeat(SHARES, 2 * k)
+    order = BY_SHARE + 2 * np.repeat(np.arange(n), 2 * k) + np.tile(turned, n)
+    place = both.at_shares(row, share)
+    return [_judged(both, row, place, order, contour).called(np.tile(rows, 2))]
 
 
 def _judged(
@@ -128,7 +128,7 @@ def _judged(
     return _Options(
         row=row,
         place=place,
-        turned=np.full(n, view.turned),
+        turned=view.turned[row],
         order=np.broadcast_to(np.asarray(order), n),
         quality=quality_of_halves(faces, sweep, place, contour),
     )
