@@ -1,6 +1,8 @@
 """Straight skeletons of 2,000 random polygons: checked, timed, compared with CGAL's.
 
 ``python -m tests.benchmarks.skeleton`` checks and times them;
+``python -m tests.benchmarks.skeleton --networks folder`` does so for the blocks of street networks,
+GeoPackages with a layer `edges`;
 ``python -m tests.benchmarks.skeleton --oracle venv/bin/python`` compares them with those of CGAL,
 for which that Python must have the package pysfcgal.
 """
@@ -11,13 +13,16 @@ import argparse
 import itertools
 import time
 from collections import Counter, defaultdict
+from pathlib import Path
 
+import geopandas as gpd
 import numpy as np
 import shapely
 
 from tests.unit.skeleton_oracle import skeletons_by_cgal
-from tests.unit.skeleton_polygons import FAMILIES, random_polygons, rings_of_polygon
+from tests.unit.skeleton_polygons import random_polygons, rings_of_polygon
 from urban_processing.errors import TopologyError
+from urban_processing.site import snap_to_grid
 from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 SAME = 1e-5
@@ -31,8 +36,12 @@ def main() -> None:
     parser.add_argument("--oracle", metavar="PYTHON", help="a Python that has pysfcgal")
     parser.add_argument("--share", type=float, default=1.0, help="share of the 2,000 polygons")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--networks", metavar="FOLDER", type=Path, help="blocks of these instead")
     args = parser.parse_args()
-    polygons = list(random_polygons(args.share, args.seed))
+    if args.networks:
+        polygons = [(p.stem, b) for p in sorted(args.networks.glob("*.gpkg")) for b in _blocks(p)]
+    else:
+        polygons = list(random_polygons(args.share, args.seed))
     skeletons, seconds = [], defaultdict(list)
     for _, polygon in polygons:
         xy, offsets = rings_of_polygon(polygon)
@@ -44,7 +53,7 @@ def main() -> None:
         seconds[next((s for s in SIZES if len(xy) <= s), 9999)].append(
             time.process_time() - started
         )
-    for family in FAMILIES:
+    for family in dict.fromkeys(name for name, _ in polygons):
         mine = [k for k, (name, _) in enumerate(polygons) if name == family]
         good = sum(_tiles(skeletons[k], polygons[k][1]) for k in mine)
         print(f"{family}: {good} of {len(mine)} tile exactly with simple faces")
@@ -55,6 +64,18 @@ def main() -> None:
         )
     if args.oracle:
         _compare(polygons, skeletons, args.oracle)
+
+
+def _blocks(path: Path) -> list[shapely.Polygon]:
+    """What the streets of a network enclose, less 6 m on all sides, on the usual grid."""
+    edges = gpd.read_file(path, layer="edges")
+    lines = shapely.union_all(edges.to_crs(edges.estimate_utm_crs()).geometry.to_numpy())
+    enclosed = shapely.get_parts(shapely.polygonize(shapely.get_parts(lines)))
+    blocks = shapely.get_parts(shapely.buffer(enclosed, -6, join_style="mitre"))
+    origin = np.floor(shapely.get_coordinates(blocks).min(axis=0))
+    blocks = shapely.transform(blocks, lambda xy: snap_to_grid(xy - origin))
+    blocks = shapely.remove_repeated_points(blocks[shapely.area(blocks) > 50])
+    return list(blocks[shapely.is_valid(blocks)])
 
 
 def _tiles(skeleton: Skeleton | None, polygon: shapely.Polygon) -> bool:

@@ -16,7 +16,7 @@ from urban_processing.params.blocks import BlocksParams
 from urban_processing.site import snap_to_grid
 
 FEW = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
 )
 
 COORDINATES = st.one_of(

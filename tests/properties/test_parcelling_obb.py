@@ -23,7 +23,8 @@ from parcel_grounds import (
 )
 
 from urban_processing.access_rule import reached_frontage
-from urban_processing.parcelling.compose import join_pieces, part_of_ground, part_of_rules
+from urban_processing.parcelling import obb
+from urban_processing.parcelling.ground import join_parts
 from urban_processing.parcelling.obb import divide_by_boxes
 
 NETWORKS = Path(__file__).parents[3] / "shared" / "data" / "redistributable" / "networks"
@@ -160,6 +161,19 @@ def test_holes_are_opened_by_the_first_cuts():
         assert (shapely.get_num_interior_rings(pieces.polygons()) == 0).all()
 
 
+def test_streets_along_a_cut_belong_to_the_piece_they_bound():
+    # the middle cut runs along the street at (30, 45) and leaves the land west of it without
+    step = shapely.Polygon([(0, 0), (60, 0), (60, 60), (30, 60), (30, 30), (0, 30)])
+    rings = ground_of(step).rings
+    middle = ((rings.xy + rings.xy[rings.following]) / 2).tolist()
+    access = np.array([side in ([30.0, 45.0], [60.0, 30.0]) for side in middle])
+    assert access.sum() == 2
+    rules = rules_of(1, 500.0, irregularity=0.0, min_width=1.0)
+    pieces = divide_by_boxes(ground_of(step, access=access), rules, seed=0)
+    assert pieces.n_faces > 1
+    assert (frontage_of(pieces) > 0).all()
+
+
 def test_a_hole_that_touches_the_contour_leaves_valid_parcels():
     shell = [(0, 0), (60, 0), (120, 0), (120, 70), (0, 70)]
     touching = shapely.Polygon(shell, [[(60, 0), (50, 30), (70, 30)]])
@@ -190,18 +204,27 @@ def test_blocks_are_divided_apart_as_together():
     ground = ground_of(some_blocks())
     rules = rules_of(len(ground), 100.0, street_access=0.5)
     whole = divide_by_boxes(ground, rules, seed=1)
-    halves = np.array_split(np.arange(len(ground)), 3)
-    grounds = [part_of_ground(ground, half) for half in halves]
     parts = [
-        divide_by_boxes(part, part_of_rules(rules, half), seed=1)
-        for part, half in zip(grounds, halves, strict=True)
+        (rows, divide_by_boxes(ground.of(rows), rules.of(rows), seed=1))
+        for rows in np.array_split(np.arange(len(ground)), 3)
     ]
-    joined = join_pieces(parts, [len(part.rings.xy) for part in grounds])
+    joined = join_parts(parts, ground)
     assert_tiled(joined, ground)
     np.testing.assert_array_equal(joined.lineage, whole.lineage)
     np.testing.assert_array_equal(joined.level, whole.level)
     np.testing.assert_array_equal(joined.offsets, whole.offsets)
     np.testing.assert_array_equal(joined.xy[joined.vertex], whole.xy[whole.vertex])
+
+
+def test_how_many_are_worked_on_at_once_does_not_matter(monkeypatch):
+    ground = ground_of(some_blocks())
+    rules = rules_of(len(ground), 100.0)
+    one = divide_by_boxes(ground, rules, seed=1)
+    monkeypatch.setattr(obb, "PARCELS_AT_ONCE", 100)
+    two = divide_by_boxes(ground, rules, seed=1)
+    assert_tiled(two, ground)
+    np.testing.assert_array_equal(one.lineage, two.lineage)
+    np.testing.assert_array_equal(one.xy[one.vertex], two.xy[two.vertex])
 
 
 def test_where_a_ring_starts_does_not_matter():

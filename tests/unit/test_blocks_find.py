@@ -16,6 +16,7 @@ from urban_processing.blocks.streets import StreetLines, street_lines
 from urban_processing.errors import BoundaryError, ParameterError
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.params.blocks import BlocksParams
+from urban_processing.site import snap_to_grid
 
 Place = tuple[float, float]
 
@@ -407,3 +408,29 @@ def test_streets_that_leave_the_land_are_no_dead_ends() -> None:
     pruned = found(lines, land=land, dead_ends=False)
     assert "dead_ends_left_out" in told(pruned)
     assert sorted(areas(pruned)) == [pytest.approx(a, abs=8) for a in (1425, 7125, 9500)]
+
+
+@pytest.mark.parametrize("degrees", [17.0, 90.0, 211.0])
+def test_blocks_turn_with_their_streets(degrees: float) -> None:
+    lines = [
+        *grid(3),
+        line((50, 0), (50, 60)),
+        line((130, 100), (130, 196)),
+        line((0, 0), (300, 80)),
+    ]
+    width = np.linspace(6, 14, len(lines))
+    turned = [shapely.affinity.rotate(g, degrees, origin=(0, 0)) for g in lines]
+    turned = shapely.transform(turned, snap_to_grid).tolist()
+    a, b = found(lines, width=width), found(turned, width=width)
+    assert sorted(areas(a)) == pytest.approx(sorted(areas(b)), rel=1e-4, abs=0.5)
+    assert told(a) == told(b)
+    lengths = [
+        np.bincount(
+            np.searchsorted(width, out.blocks.edge_width),
+            weights=np.hypot(
+                *(out.blocks.rings.xy[out.blocks.rings.following] - out.blocks.rings.xy).T
+            ),
+        )
+        for out in (a, b)
+    ]
+    np.testing.assert_allclose(*lengths, atol=1.0)

@@ -1,7 +1,5 @@
 """The parts of subdivision by boxes: boxes, sweeps, cuts by lines, noding, pieces put together."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shapely
@@ -12,7 +10,6 @@ from parcel_grounds import (
     assert_tiled,
     frontage_of,
     ground_of,
-    polygons_of,
     rectilinear,
     rules_of,
     star,
@@ -21,12 +18,7 @@ from parcel_grounds import (
 
 from urban_processing.parcelling import obb
 from urban_processing.parcelling.boxes import smallest_boxes
-from urban_processing.parcelling.compose import (
-    ground_of_faces,
-    join_pieces,
-    part_of_ground,
-    replace_faces,
-)
+from urban_processing.parcelling.compose import ground_of_faces, replace_faces
 from urban_processing.parcelling.line_cuts import THE_CUT, Lines, cut
 from urban_processing.parcelling.noding import Segments, node_rings
 from urban_processing.parcelling.obb import divide_by_boxes
@@ -246,23 +238,3 @@ def test_two_divided_neighbours_share_what_meets_at_one_place():
     assert together.n_faces == 4
     assert (together.xy[together.vertex] == [30.0, 20.0]).all(axis=1).sum() == 4
     assert len(np.unique(together.vertex)) == 9
-
-
-def test_parts_of_ground_carry_what_is_known_of_edges():
-    ground = ground_of([with_holes(np.random.default_rng(1), 2), shapely.box(0, 0, 30, 20)])
-    n = len(ground.rings.xy)
-    known = replace(ground, width=np.arange(n) * 1.0, street=np.arange(n), access=np.arange(n) > 5)
-    part = part_of_ground(known, np.array([1]))
-    assert shapely.equals(polygons_of(part)[0], shapely.box(0, 0, 30, 20))
-    np.testing.assert_array_equal(part.street, np.arange(n - 4, n))
-    np.testing.assert_array_equal(part.width, part.street)
-    assert part.access.all()
-    np.testing.assert_array_equal(part.lineage, ground.lineage[1:])
-
-
-def test_pieces_of_one_ground_joined_are_those_pieces():
-    ground = ground_of(shapely.box(0, 0, 60, 40))
-    pieces = divide_by_boxes(ground, rules_of(1), seed=0)
-    joined = join_pieces([pieces], [4])
-    for name in ("xy", "vertex", "offsets", "face", "access", "block", "lineage", "level", "patio"):
-        np.testing.assert_array_equal(getattr(joined, name), getattr(pieces, name))

@@ -162,6 +162,13 @@ def test_layers_that_do_not_overlap_have_nothing_in_common(before):
     assert "numbers_missing" in codes
 
 
+def test_numbers_may_be_text():
+    old = frame(
+        [shapely.box(20 * i, 0, 20 * i + 20, 30) for i in range(3)], number=["30", "7", "9"]
+    )
+    assert up.transfer(old, old, id_column="number").parcels.parcel_id.tolist() == [7, 9, 30]
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

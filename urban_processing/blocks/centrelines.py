@@ -10,61 +10,18 @@ import numpy.typing as npt
 import shapely
 from scipy.spatial import cKDTree
 
+from urban_processing.blocks.noding import NODE_GRID, Centrelines, node_lines
 from urban_processing.blocks.streets import StreetLines
 from urban_processing.mesh.components import components
-from urban_processing.mesh.places import lower_end_first
+from urban_processing.mesh.places import are_near
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.rights_of_way.centrelines import segments_on
-from urban_processing.site import GRID, Issue, snap_to_grid
+from urban_processing.site import Issue
 
 OWN_STRETCH = 4.0
 """An end is not joined to its own line, nor to what meets it, within so many tolerances."""
 
 ROUNDED_DIGITS = 6
 """Distances that agree to this many digits of a metre are equal."""
-
-
-@dataclass(frozen=True, eq=False)
-class Centrelines:
-    """S noded segments; they meet at their ends alone.
-
-    Parameters
-    ----------
-    segments
-        (S, 2, 2) ends, the lower first, sorted.
-    line
-        (S,) line that each comes from; of several the widest.
-    """
-
-    segments: FloatArray
-    line: IntArray
-
-    @property
-    def node_xy(self) -> FloatArray:
-        """(N, 2) places where segments end, sorted."""
-        return np.unique(self.segments.reshape(-1, 2), axis=0)
-
-    @property
-    def ends(self) -> IntArray:
-        """(S, 2) nodes at both ends."""
-        _, node = np.unique(self.segments.reshape(-1, 2), axis=0, return_inverse=True)
-        return np.asarray(node.reshape(-1, 2))
-
-    @property
-    def length(self) -> FloatArray:
-        """(S,) lengths in metres."""
-        d = self.segments[:, 1] - self.segments[:, 0]
-        return np.hypot(d[:, 0], d[:, 1])
-
-    def cut_at(self, edges: npt.NDArray[np.object_]) -> Centrelines:
-        """Return the pieces of noded lines that lie on the segments."""
-        lines = list(shapely.linestrings(self.segments))
-        segments, of = segments_on(edges, lines, np.zeros(len(lines)))
-        return _sorted(segments, self.line[of])
-
-    def take(self, kept: BoolArray) -> Centrelines:
-        """Return some of the segments."""
-        return Centrelines(self.segments[kept], self.line[kept])
 
 
 def clean_centrelines(
@@ -92,8 +49,8 @@ def clean_centrelines(
     """
     issues: list[Issue] = []
     rows = np.flatnonzero(_worth_keeping(streets.lines, snap, issues))
-    lines = streets.lines[rows]
-    work = _noded(lines, streets.width[rows])
+    lines = shapely.transform(streets.lines[rows], lambda xy: np.round(xy / NODE_GRID) * NODE_GRID)
+    work = node_lines(lines, streets.width[rows])
     work = replace(work, line=rows[work.line])
     issues += _crossings(work, lines)
     _tell_doubled(lines, work, snap, issues)
@@ -111,7 +68,7 @@ def _worth_keeping(lines: npt.NDArray[np.object_], snap: float, issues: list[Iss
     """Lines that have a length and are no loops smaller than the tolerance."""
     west, south, east, north = shapely.bounds(lines).T
     extent = np.maximum(east - west, north - south)
-    tiny = (shapely.length(lines) < GRID) | (shapely.is_closed(lines) & (extent < snap))
+    tiny = (shapely.length(lines) < NODE_GRID) | (shapely.is_closed(lines) & (extent < snap))
     if tiny.any():
         message = (
             f"{int(tiny.sum())} line(s) without length or loops below {snap:g} m were dropped."
@@ -120,28 +77,14 @@ def _worth_keeping(lines: npt.NDArray[np.object_], snap: float, issues: list[Iss
     return np.asarray(~tiny)
 
 
-def _noded(lines: npt.NDArray[np.object_], width: FloatArray) -> Centrelines:
-    """Segments between all crossings and vertices, each once, and their lines."""
-    if not len(lines):
-        return Centrelines(np.empty((0, 2, 2)), np.empty(0, dtype=np.int64))
-    edges = shapely.get_parts(shapely.union_all(lines, grid_size=GRID))
-    return _sorted(*segments_on(edges, list(lines), width))
-
-
-def _sorted(segments: FloatArray, line: IntArray) -> Centrelines:
-    segments = lower_end_first(segments)
-    order = np.lexsort(segments.reshape(-1, 4).T[::-1])
-    return Centrelines(segments[order], line[order])
-
-
 def _crossings(work: Centrelines, lines: npt.NDArray[np.object_]) -> list[Issue]:
     """Say where lines cross and none has a vertex."""
     at = work.node_xy
     degree = np.bincount(work.ends.ravel(), minlength=len(at))
-    vertices = shapely.get_coordinates(lines)
-    known = np.unique(np.concatenate([vertices, at]), axis=0, return_inverse=True)[1].ravel()
-    vertex = np.isin(known[len(vertices) :], known[: len(vertices)])
-    found = (degree > 2) & ~vertex
+    meet = np.flatnonzero(degree > 2)
+    vertices = shapely.points(shapely.get_coordinates(lines))
+    at = at[meet]
+    found = ~are_near(at, vertices, 2 * NODE_GRID)
     n = int(found.sum())
     if not n:
         return []
@@ -153,7 +96,7 @@ def _tell_doubled(
     lines: npt.NDArray[np.object_], work: Centrelines, snap: float, issues: list[Issue]
 ) -> None:
     doubled = float(shapely.length(lines).sum() - work.length.sum())
-    if doubled > max(snap, GRID):
+    if doubled > max(snap, NODE_GRID):
         same = len(lines) - len(np.unique(shapely.to_wkb(lines)))
         message = (
             f"{doubled:.0f} m of lines lie on others and count once; {same} line(s) are there "
@@ -246,7 +189,7 @@ def _joined(work: Centrelines, width: FloatArray, snap: float, issues: list[Issu
     segments = places[work.ends]
     long = (segments[:, 0] != segments[:, 1]).any(axis=1)
     source = work.line[long]
-    again = _noded(np.asarray(shapely.linestrings(segments[long])), width[source])
+    again = node_lines(np.asarray(shapely.linestrings(segments[long])), width[source])
     at = np.array([xy[node] for node in moved])
     message = f"{len(moved)} end(s) of streets were moved by up to {snap:g} m to meet others."
     issues.append(
@@ -298,7 +241,7 @@ def _foot(segment: FloatArray, place: FloatArray, snap: float) -> FloatArray:
         return np.asarray(segment[int(np.argmin(np.round(away, ROUNDED_DIGITS)))])
     way = segment[1] - segment[0]
     share = float(np.clip(((place - segment[0]) * way).sum() / (way**2).sum(), 0.0, 1.0))
-    return snap_to_grid(segment[0] + share * way)
+    return np.asarray(np.round((segment[0] + share * way) / NODE_GRID) * NODE_GRID)
 
 
 def _dead_ends(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from urban_processing.blocks.centrelines import Centrelines
 from urban_processing.blocks.model import BlockRings
 from urban_processing.blocks.net import Faces, Sides
+from urban_processing.blocks.noding import Centrelines, angles_between
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.rights_of_way.centrelines import BESIDE
 
@@ -81,8 +81,8 @@ def streets_along(
     beyond = shapely.distance(points[edge], lines[side]) - half[side]
     if len(faces.rims):
         rim = shapely.dwithin(shapely.union_all(faces.rims), points, BESIDE)
-        way = work.segments[sides.segment][:, 1] - work.segments[sides.segment][:, 0]
-        along = (beyond <= snap) & (_angle(way[side], (b - a)[edge]) <= ALIGNED_DEG)
+        angle = angles_between(work.segments[sides.segment[side]], np.stack([a, b], axis=1)[edge])
+        along = (beyond <= snap) & (angle <= ALIGNED_DEG)
         kept = along | ~rim[edge]
         side, edge, beyond = side[kept], edge[kept], beyond[kept]
     wide = -width[sides.segment[side]]
@@ -109,8 +109,8 @@ def streets_beside(rings: BlockRings, segments: FloatArray, reach: FloatArray) -
     points = shapely.points((a + b) / 2)
     lines = shapely.linestrings(segments)
     segment, edge = shapely.STRtree(points).query(lines, predicate="dwithin", distance=reach)
-    way = segments[:, 1] - segments[:, 0]
-    along = _angle(way[segment], (b - a)[edge]) <= ALIGNED_DEG
+    angle = angles_between(segments[segment], np.stack([a, b], axis=1)[edge])
+    along = angle <= ALIGNED_DEG
     segment, edge = segment[along], edge[along]
     away = np.round(shapely.distance(points[edge], lines[segment]), ROUNDED_DIGITS)
     order = np.lexsort((segment, away, edge))
@@ -118,9 +118,3 @@ def streets_beside(rings: BlockRings, segments: FloatArray, reach: FloatArray) -
     out = np.full(len(points), -1)
     out[first] = segment[order[at]]
     return out
-
-
-def _angle(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Angle in degrees between the lines along two vectors, 0 to 90."""
-    cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    return np.asarray(np.degrees(np.arctan2(cross, np.abs((u * v).sum(axis=1)))))

@@ -9,15 +9,15 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.blocks.centrelines import Centrelines
 from urban_processing.blocks.necks import neck_lines
+from urban_processing.blocks.noding import Centrelines
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.params.blocks import BlocksParams
 from urban_processing.rights_of_way.centrelines import BESIDE, turning_heads
 from urban_processing.rights_of_way.partition import Cut, cut_out
-from urban_processing.rights_of_way.surfaces import StreetSides, street_surfaces
+from urban_processing.rights_of_way.surfaces import StreetSides, Surfaces, street_surfaces
 from urban_processing.site import GRID, Issue
 
 Geometries = npt.NDArray[np.object_]
@@ -186,12 +186,10 @@ def net_blocks(
         turning_heads(faces.polygons, faces.rims, work.segments, rank, params.turning_radius),
         corner_radius=params.corner_radius,
     )
+    necks = neck_lines(_roughly_net(faces.polygons, surfaces), params.min_width)
+    surfaces = replace(surfaces, outlines=np.append(surfaces.outlines, necks))
     each = np.arange(len(faces.polygons))
     cut = cut_out(faces.polygons, faces.edges, surfaces, block=each)
-    necks = neck_lines(cut.faces[cut.net], params.min_width)
-    if len(necks):
-        surfaces = replace(surfaces, outlines=np.append(surfaces.outlines, necks))
-        cut = cut_out(faces.polygons, faces.edges, surfaces, block=each)
     loose = np.zeros(len(cut.faces), dtype=bool)
     left = np.flatnonzero(cut.net)
     small = shapely.area(cut.faces[left]) < max(params.min_area, GRID)
@@ -203,6 +201,18 @@ def net_blocks(
     order = _by_place(blocks)
     order = order[np.argsort(faces.part[face[order]], kind="stable")]
     return NetBlocks(blocks[order], face[order], *cut.rights_of_way(faces.part)), issues
+
+
+def _roughly_net(faces: Geometries, surfaces: Surfaces) -> Geometries:
+    """Polygons that street surfaces leave of faces, whose vertices may lie a hair beside theirs."""
+    order = np.argsort(surfaces.block, kind="stable")
+    block = surfaces.block[order]
+    start = np.flatnonzero(np.diff(block, prepend=-1))
+    groups = np.split(surfaces.regions[order], start[1:]) if len(order) else []
+    taken = np.full(len(faces), shapely.Polygon(), dtype=object)
+    taken[block[start]] = [shapely.union_all(group) for group in groups]
+    parts = shapely.get_parts(shapely.difference(faces, taken))
+    return np.asarray(parts[shapely.get_dimensions(parts) == 2])
 
 
 def _issues(

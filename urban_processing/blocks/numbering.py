@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from urban_processing.blocks.centrelines import Centrelines
 from urban_processing.blocks.model import UNKNOWN_STREET
+from urban_processing.blocks.noding import Centrelines
 from urban_processing.blocks.streets import StrArray
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray

@@ -86,9 +86,12 @@ class _Cleaned:
             raise BoundaryError(f"{layer.name}: its polygons have no area.")
         self.notes = each.notes
         self.layer = layer
-        self.rows, first = np.unique(each.row[some], return_index=True)
-        parts = np.split(each.valid[some], first[1:])
-        self.polygons = np.array([_one(group) for group in parts], dtype=object)
+        valid = each.valid[some]
+        self.rows, first, count = np.unique(each.row[some], return_index=True, return_counts=True)
+        self.polygons = valid[first]
+        several = (count > 1) | (shapely.get_type_id(valid[first]) != shapely.GeometryType.POLYGON)
+        for i in np.flatnonzero(several):
+            self.polygons[i] = _one(valid[first[i] : first[i] + count[i]])
 
     def issues(self, called: str) -> Iterator[Issue]:
         """What was repaired or left out."""

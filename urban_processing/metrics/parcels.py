@@ -17,6 +17,7 @@ from urban_processing.mesh.corners import (
     ring_neighbours,
 )
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.metrics.thinness import inscribed_thinness
 
 OPPOSITE_DEG = 135.0
 """Sides are opposite where their outward normals make a larger angle."""
@@ -24,10 +25,6 @@ OPPOSITE_DEG = 135.0
 UNDESIRABLE_ANGLE_DEG = 15.0
 UNDESIRABLE_AREA_RATIO = 1.2
 """Parcels above one of these are undesirable (Yang 2013, section 7)."""
-
-CIRCLE_TOLERANCE = 0.004
-OUTLINE_TOLERANCE = 0.003
-"""Accuracy of the inscribed circle and of the outline it is fitted to, relative to √area."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,18 +192,6 @@ def _sides(xy: FloatArray, offsets: IntArray, on_street: FloatArray) -> _Sides:
     corners, corner_offsets = reported_polygons(xy, offsets)
     frontage = _frontage_of_sides(on_street, offsets, corners, corner_offsets)
     return _Sides(corners, corner_offsets, xy[corners], frontage)
-
-
-def inscribed_thinness(polygons: npt.NDArray[np.object_], area: FloatArray) -> FloatArray:
-    """Diameter of the largest inscribed circle over √area, within about 1 %.
-
-    The outline is simplified first, by less than the accuracy asked for: the circle costs a
-    tenth of the time where a curved side has few vertices.
-    """
-    side = np.sqrt(area)
-    outline = shapely.simplify(polygons, OUTLINE_TOLERANCE * side)
-    radius = shapely.maximum_inscribed_circle(outline, CIRCLE_TOLERANCE * side)
-    return np.asarray(2.0 * shapely.length(radius) / side)
 
 
 def _frontage_of_sides(

@@ -109,17 +109,24 @@ class View:
         (K,) the middle, moved, with the smallest area on both sides.
     snapped
         (K,) the same through a corner of the contour where one is near.
+    turned
+        (K,) whether the axis is the other one.
     """
 
     faces: Faces
     sweep: Sweep
     regular: FloatArray
     snapped: FloatArray
+    turned: BoolArray
 
     def take(self, rows: IntArray) -> View:
         """Return the view of some of the faces."""
         return View(
-            self.faces.take(rows), self.sweep.take(rows), self.regular[rows], self.snapped[rows]
+            faces=self.faces.take(rows),
+            sweep=self.sweep.take(rows),
+            regular=self.regular[rows],
+            snapped=self.snapped[rows],
+            turned=self.turned[rows],
         )
 
     def at_shares(self, rows: IntArray, shares: FloatArray) -> FloatArray:
@@ -135,12 +142,12 @@ class View:
         return _through_holes(faces, sweep, sweep.places(wanted, np.zeros(len(rows))))
 
 
-def view_along(faces: Faces, xy: FloatArray, contour: Contour, *, turned: bool) -> View:
-    """Look at faces along the axes of their boxes, or along the other ones."""
-    boxes = faces.boxes.turned(np.ones(len(faces), dtype=bool)) if turned else faces.boxes
+def view_along(faces: Faces, xy: FloatArray, contour: Contour, *, turned: BoolArray) -> View:
+    """Look at faces along the axes of their boxes; where `turned` (K,), along the other ones."""
+    boxes = faces.boxes.turned(turned) if turned.any() else faces.boxes
     sweep = sweep_along(faces.rings, xy, boxes)
     regular = _regular(faces, sweep)
-    return View(faces, sweep, regular, _snapped(faces, sweep, regular, contour))
+    return View(faces, sweep, regular, _snapped(faces, sweep, regular, contour), turned)
 
 
 def _regular(faces: Faces, sweep: Sweep) -> FloatArray:

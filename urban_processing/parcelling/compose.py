@@ -1,34 +1,14 @@
-"""Put pieces together: faces divided further, and blocks divided apart."""
+"""Faces divided further: as ground, and back among the other pieces."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
 from urban_processing.blocks.model import UNKNOWN_STREET, BlockRings
 from urban_processing.mesh.planar import FloatArray, IntArray
-from urban_processing.parcelling.ground import Ground, Pieces, Rules
+from urban_processing.parcelling.ground import Ground, Pieces
 from urban_processing.parcelling.noding import Segments, node_rings
 from urban_processing.parcelling.rings import Rings, starts
-
-
-def part_of_ground(ground: Ground, polygons: IntArray) -> Ground:
-    """Return some of the polygons of a ground, in the order given."""
-    rings = _rings_of_ground(ground)
-    part = rings.take(polygons)
-    return Ground(
-        rings=BlockRings(ground.rings.xy[part.vertex], part.offsets, part.face),
-        access=ground.access[part.vertex],
-        width=ground.width[part.vertex],
-        street=ground.street[part.vertex],
-        lineage=ground.lineage[polygons],
-    )
-
-
-def part_of_rules(rules: Rules, polygons: IntArray) -> Rules:
-    """Return what holds for some of the polygons."""
-    return Rules(**{name: getattr(rules, name)[polygons] for name in Rules.__dataclass_fields__})
 
 
 def ground_of_faces(
@@ -117,46 +97,6 @@ def replace_faces(pieces: Pieces, faces: IntArray, sub: Pieces) -> Pieces:
         level=np.append(pieces.level[kept], pieces.level[faces[sub.block]] + sub.level)[order],
         patio=np.append(pieces.patio[kept], sub.patio)[order],
     )
-
-
-def join_pieces(parts: Sequence[Pieces], n_ground: Sequence[int]) -> Pieces:
-    """Put the pieces of several grounds together; blocks are numbered on.
-
-    Parameters
-    ----------
-    parts
-        Pieces of each ground.
-    n_ground
-        Number of vertices of each ground.
-    """
-    total = sum(n_ground)
-    first = starts(np.array(n_ground))
-    added = total + starts(np.array([len(p.xy) - n for p, n in zip(parts, n_ground, strict=True)]))
-    n_faces = starts(np.array([part.n_faces for part in parts]))
-    n_blocks = starts(np.array([part.block[-1] + 1 for part in parts]))
-    vertex = []
-    for k, (part, n) in enumerate(zip(parts, n_ground, strict=True)):
-        vertex.append(part.vertex + np.where(part.vertex < n, first[k], added[k] - n))
-    sizes = [np.diff(part.offsets) for part in parts]
-    return Pieces(
-        xy=np.concatenate(
-            [part.xy[:n] for part, n in zip(parts, n_ground, strict=True)]
-            + [part.xy[n:] for part, n in zip(parts, n_ground, strict=True)]
-        ),
-        vertex=np.concatenate(vertex),
-        offsets=starts(np.concatenate(sizes)),
-        face=np.concatenate([part.face + n_faces[k] for k, part in enumerate(parts)]),
-        access=np.concatenate([part.access for part in parts]),
-        block=np.concatenate([part.block + n_blocks[k] for k, part in enumerate(parts)]),
-        lineage=np.concatenate([part.lineage for part in parts]),
-        level=np.concatenate([part.level for part in parts]),
-        patio=np.concatenate([part.patio for part in parts]),
-    )
-
-
-def _rings_of_ground(ground: Ground) -> Rings:
-    edge = np.arange(len(ground.rings.xy))
-    return Rings(edge, edge, ground.rings.offsets, ground.rings.block)
 
 
 def _rings_of_pieces(pieces: Pieces) -> Rings:

@@ -11,10 +11,12 @@ from urban_processing.hashing import splitmix64, uniform
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.parcelling.boxes import Boxes, smallest_boxes
 from urban_processing.parcelling.candidates import Contour, Faces
-from urban_processing.parcelling.ground import Ground, Pieces, Rules, UintArray
-from urban_processing.parcelling.halving import Halved, halve, street_sides
+from urban_processing.parcelling.cut_tree import Level, Tree, collected, leaves_in_order, taken_back
+from urban_processing.parcelling.ground import Ground, Pieces, Rules, join_parts
+from urban_processing.parcelling.halving import Halved, halve
 from urban_processing.parcelling.line_cuts import THE_CUT
 from urban_processing.parcelling.noding import Segments, node_rings
+from urban_processing.parcelling.quality import fronts_of
 from urban_processing.parcelling.rings import Rings, join_rings, ranges, starts
 from urban_processing.site import AREA_ROUNDING
 
@@ -25,18 +27,10 @@ AT_A_PINCH = 0.5
 """Share of the smallest width that pieces of a face above the largest area may be down to, where
 none keeps it: a front somewhat narrow is less of an evil than a parcel that is far too large."""
 
+PARCELS_AT_ONCE = 50_000
+"""About as many parcels, if all were as small as allowed, are worked on at once."""
+
 _DRAWS = 2
-
-
-@dataclass(frozen=True, eq=False)
-class _Level:
-    """Faces made by the same number of cuts, in the order of those they come from."""
-
-    rings: Rings
-    block: IntArray
-    lineage: UintArray
-    parent: IntArray
-    """Face of the level before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +41,10 @@ class _Plane:
     segments: Segments
 
 
-@dataclass(frozen=True, eq=False)
-class _Tree:
-    """All faces there were, level by level, and for each level those that stayed whole."""
-
-    levels: list[_Level]
-    leaves: list[BoolArray]
-
-
 def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     """Halve faces across their oriented boxes until they are small enough.
 
-    A face is halved while its area is above `max_area`, its front (`halving.street_sides`) is
+    A face is halved while its area is above `max_area`, its front (`quality.fronts_of`) is
     wider than `max_width`, or it has holes, if each piece keeps `min_area`. The cut goes across
     the longer side of the smallest box along an edge, through its middle, moved by ω·r
     times the *shorter* side with r between −½ and ½; so far only that `min_area` is left on both
@@ -86,6 +72,24 @@ def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     Pieces
         Parcels in the order of their polygons; within one in the order of the cuts.
     """
+    batches = _batches(ground, rules)
+    if len(batches) <= 1:
+        return _divide(ground, rules, seed)
+    parts = [(rows, _divide(ground.of(rows), rules.of(rows), seed)) for rows in batches]
+    return join_parts(parts, ground)
+
+
+def _batches(ground: Ground, rules: Rules) -> list[IntArray]:
+    """Polygons that are worked on together: as many as the processor's caches hold well."""
+    area = _first_level(ground).rings.areas(ground.rings.xy)
+    n_parcels = np.cumsum(area / rules.min_area)
+    return np.split(
+        np.arange(len(ground)), np.flatnonzero(np.diff(n_parcels // PARCELS_AT_ONCE)) + 1
+    )
+
+
+def _divide(ground: Ground, rules: Rules, seed: int) -> Pieces:
+    """Divide all polygons together, level by level."""
     contour = _contour_of(ground)
     levels = [_first_level(ground)]
     plane = _Plane(ground.rings.xy, _edge_segments(ground))
@@ -96,7 +100,7 @@ def divide_by_boxes(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
         if halved is None:
             break
         levels.append(halved)
-    return _as_pieces(ground, contour, plane, _Tree(levels, leaves))
+    return _as_pieces(ground, contour, plane, Tree(levels, leaves))
 
 
 def _contour_of(ground: Ground) -> Contour:
@@ -113,11 +117,11 @@ def _contour_of(ground: Ground) -> Contour:
     return Contour(np.append(bends, False), np.append(ground.access, False))
 
 
-def _first_level(ground: Ground) -> _Level:
+def _first_level(ground: Ground) -> Level:
     n = len(ground.rings.xy)
     rings = Rings(np.arange(n), np.arange(n), ground.rings.offsets, ground.rings.block)
     block = np.arange(len(ground))
-    return _Level(rings, block, ground.lineage, block)
+    return Level(rings, block, ground.lineage, block)
 
 
 def _edge_segments(ground: Ground) -> Segments:
@@ -129,8 +133,8 @@ def _edge_segments(ground: Ground) -> Segments:
 
 
 def _halve_level(
-    level: _Level, rules: Rules, seed: int, known: tuple[_Plane, Contour]
-) -> tuple[_Level | None, BoolArray, _Plane]:
+    level: Level, rules: Rules, seed: int, known: tuple[_Plane, Contour]
+) -> tuple[Level | None, BoolArray, _Plane]:
     """Return the pieces of all faces that are halved, which are not, and the vertices so far."""
     plane, contour = known
     area = level.rings.areas(plane.xy)
@@ -153,11 +157,11 @@ def _halve_level(
     whole[parent] = False
     rank = np.arange(len(parent)) - np.searchsorted(parent, parent)
     lineage = splitmix64(level.lineage[parent] ^ splitmix64((rank + 1).astype(np.uint64)))
-    return _Level(rings.take(order), level.block[parent], lineage, parent), whole, plane
+    return Level(rings.take(order), level.block[parent], lineage, parent), whole, plane
 
 
 def _faces_at(
-    level: _Level,
+    level: Level,
     rows: IntArray,
     area: FloatArray,
     rules: Rules,
@@ -168,7 +172,7 @@ def _faces_at(
     plane, contour = known
     rings, block = level.rings.take(rows), level.block[rows]
     boxes = smallest_boxes(rings, plane.xy)
-    sides = street_sides(rings, plane.xy, boxes.axis, contour)
+    sides = fronts_of(rings, plane.xy, boxes.axis, contour)
     draws = uniform(seed, level.lineage[rows], _DRAWS)
     min_width = rules.min_width[block]
     too_large = area > rules.max_area[block] * (1.0 + AREA_ROUNDING)
@@ -222,7 +226,7 @@ def _added_to_plane(part: Halved, boxes: Boxes, plane: _Plane) -> tuple[Rings, _
     )
 
 
-def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: _Tree) -> Pieces:
+def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: Tree) -> Pieces:
     """Collect the faces that stayed whole, in the order of cuts, and node them.
 
     Where a face is valid no more with the vertices of its neighbours, as may be where it is
@@ -230,13 +234,13 @@ def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: _Tree) -> 
     """
     n_ground = len(ground.rings.xy)
     while True:
-        depth, face = _leaves_in_order(tree)
-        rings = _collected(tree, depth, face)
+        depth, face = leaves_in_order(tree)
+        rings = collected(tree, depth, face)
         noded, _ = node_rings(rings, plane.xy, plane.segments, n_fixed=n_ground)
         broken = _broken(noded, plane.xy) & (depth > 0)
         if not broken.any():
             break
-        tree = _taken_back(tree, depth[broken], face[broken])
+        tree = taken_back(tree, depth[broken], face[broken])
     noded = _from_lowest(noded, plane.xy)
     xy, vertex = _used_vertices(plane.xy, noded.vertex, n_ground)
     first = starts(np.array([len(level.block) for level in tree.levels]))
@@ -254,57 +258,8 @@ def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: _Tree) -> 
     )
 
 
-def _leaves_in_order(tree: _Tree) -> tuple[IntArray, IntArray]:
-    """Level and number of the faces that stayed whole, as if pieces replaced what was cut."""
-    levels = tree.levels
-    sizes = [leaf.astype(np.int64) for leaf in tree.leaves]
-    for n in range(len(levels) - 1, 0, -1):
-        np.add.at(sizes[n - 1], levels[n].parent, sizes[n])
-    first = starts(sizes[0])[:-1]
-    position = [first[tree.leaves[0]]]
-    for n in range(1, len(levels)):
-        parent, before = levels[n].parent, starts(sizes[n])[:-1]
-        eldest = np.searchsorted(parent, parent)
-        first = first[parent] + before - before[eldest]
-        position.append(first[tree.leaves[n]])
-    order = np.argsort(np.concatenate(position))
-    face = [leaf.nonzero()[0] for leaf in tree.leaves]
-    depth = np.repeat(np.arange(len(levels)), [len(part) for part in face])
-    return depth[order], np.concatenate(face)[order]
-
-
-def _collected(tree: _Tree, depth: IntArray, face: IntArray) -> Rings:
-    """Return the rings of faces of different levels."""
-    order = np.argsort(depth, kind="stable")
-    cuts = np.searchsorted(depth[order], np.arange(len(tree.levels) + 1))
-    parts = [
-        level.rings.take(face[order[a:b]])
-        for level, a, b in zip(tree.levels, cuts[:-1], cuts[1:], strict=True)
-    ]
-    back = np.empty_like(order)
-    back[order] = np.arange(len(order))
-    return join_rings(parts).take(back)
-
-
 def _broken(noded: Rings, xy: FloatArray) -> BoolArray:
     return ~noded.are_valid(xy)
-
-
-def _taken_back(tree: _Tree, depth: IntArray, face: IntArray) -> _Tree:
-    """Return the tree in which the faces that given ones come from stayed whole."""
-    leaves = [leaf.copy() for leaf in tree.leaves]
-    within = [np.zeros(len(leaf), dtype=bool) for leaf in leaves]
-    for n in range(1, len(leaves)):
-        parent = tree.levels[n].parent
-        whole = parent[face[depth == n]]
-        leaves[n - 1][whole] = True
-        within[n - 1][whole] = True
-    for n in range(1, len(leaves)):
-        parent = tree.levels[n].parent
-        gone = within[n - 1][parent]
-        leaves[n][gone] = False
-        within[n] |= gone
-    return _Tree(tree.levels, leaves)
 
 
 def _from_lowest(rings: Rings, xy: FloatArray) -> Rings:

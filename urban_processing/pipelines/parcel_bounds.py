@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from urban_processing.access_rule import reached_frontage
 from urban_processing.mesh.planar import BoolArray, FloatArray
 from urban_processing.metrics.subdivisions import MeasuredSubdivision
 from urban_processing.params.subdivide import Strategy
@@ -23,7 +24,7 @@ def bound_findings(measured: MeasuredSubdivision) -> list[Issue]:
     made = measured.made
     pieces, rules = made.pieces, made.wanted.rules
     block = pieces.block
-    area = measured.parcels.area
+    area = np.asarray(shapely.area(made.polygons))
     least, most = rules.min_area[block], rules.max_area[block]
     parcel = ~pieces.patio
     whole = np.bincount(block)[block] == 1
@@ -52,9 +53,10 @@ def bound_findings(measured: MeasuredSubdivision) -> list[Issue]:
 
 def _unreached(measured: MeasuredSubdivision) -> list[Issue]:
     """Parcels without street: one by one where all were to have one, else their number."""
-    made, p = measured.made, measured.parcels
+    made = measured.made
     block = made.pieces.block
-    unreached = ~p.reached & ~made.pieces.patio
+    reached = made.frontage >= reached_frontage(shapely.area(made.polygons))
+    unreached = ~reached & ~made.pieces.patio
     always = made.wanted.rules.street_access >= 1.0
     always &= made.wanted.strategy != Strategy.HYBRID
     meant = unreached & ~always[block]
@@ -62,7 +64,7 @@ def _unreached(measured: MeasuredSubdivision) -> list[Issue]:
         measured,
         "parcel_unreached",
         unreached & always[block],
-        (p.frontage, np.zeros(len(block))),
+        (made.frontage, np.zeros(len(block))),
         "No street reaches a parcel: it has {value:.1f} m of street.",
     )
     if meant.any():

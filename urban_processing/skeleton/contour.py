@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +72,8 @@ def contour_of(xy: FloatArray, offsets: IntArray, straight: float) -> Contour:
     offsets
         (R + 1,) where rings begin.
     straight
-        Distance in metres within which vertices are on one straight edge.
+        Distance in metres within which vertices are on one straight edge. Where it is more than
+        `STRAIGHT`, shorter edges belong to those before them, whatever their direction.
 
     Raises
     ------
@@ -90,10 +92,11 @@ def contour_of(xy: FloatArray, offsets: IntArray, straight: float) -> Contour:
         start = min(range(len(ring)), key=lambda k: points[ring[k]])
         rings.append(ring[start:] + ring[:start])
     rings.sort(key=lambda ring: points[ring[0]])
+    twice = {place for place, count in Counter(points).items() if count > 1}
     runs: list[list[int]] = []
     following: list[int] = []
     for ring in rings:
-        new = _runs(points, ring, straight)
+        new = _runs(points, ring, straight, twice)
         begin = len(runs)
         following += [*range(begin + 1, begin + len(new)), begin]
         runs += new
@@ -108,30 +111,43 @@ def _lines(
     extent: FloatArray,
 ) -> Contour:
     """Return the lines of runs of vertices."""
-    x, y, dx, dy, c = [], [], [], [], []
     previous = [0] * len(runs)
-    for e, run in enumerate(runs):
-        previous[following[e]] = e
-        (x0, y0), (x1, y1) = points[run[0]], points[run[-1]]
+    for e, after in enumerate(following):
+        previous[after] = e
+    x, y = ([points[run[0]][axis] for run in runs] for axis in (0, 1))
+    dx, dy, c = [], [], []
+    for x0, y0, after in zip(x, y, following, strict=True):
+        x1, y1 = x[after], y[after]
         length = math.hypot(x1 - x0, y1 - y0)
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
-        x.append(x0)
-        y.append(y0)
         dx.append(ux)
         dy.append(uy)
         # the mean of both ends, so that a mirrored edge has the mirrored line
         c.append(((ux * y0 - uy * x0) + (ux * y1 - uy * x1)) / 2)
-    return Contour(origin, float(extent.max()), x, y, dx, dy, c, following, previous, runs)
+    size = float(extent.max())
+    return Contour(origin, size, x, y, dx, dy, c, following, previous, runs)
 
 
-def _runs(points: list[tuple[float, float]], ring: list[int], straight: float) -> list[list[int]]:
+def _runs(
+    points: list[tuple[float, float]],
+    ring: list[int],
+    straight: float,
+    twice: set[tuple[float, float]],
+) -> list[list[int]]:
     """Return the vertices of each merged edge of a ring, both ends included."""
     n = len(ring)
-    bend = [
-        _bend(points[ring[k - 1]], points[ring[k]], points[ring[(k + 1) % n]]) for k in range(n)
+    at = [points[k] for k in ring]
+    bend = [_bend(a, b, c) for a, b, c in zip(at[-1:] + at[:-1], at, at[1:] + at[:1], strict=True)]
+    # the wavefront is parted where rings touch
+    free = [place not in twice for place in at]
+    exact = [
+        abs(sine) <= EXACTLY_STRAIGHT and ahead and alone
+        for (sine, _, ahead), alone in zip(bend, free, strict=True)
     ]
-    exact = [abs(sine) <= EXACTLY_STRAIGHT and ahead for sine, _, ahead in bend]
-    near = [distance <= straight and ahead for _, distance, ahead in bend]
+    near = [
+        distance <= straight and ahead and alone
+        for (_, distance, ahead), alone in zip(bend, free, strict=True)
+    ]
     corners = [k for k in range(n) if not near[k]]
     cut = []
     for a, b in zip(corners, [*corners[1:], *(k + n for k in corners[:1])], strict=True):
@@ -141,6 +157,9 @@ def _runs(points: list[tuple[float, float]], ring: list[int], straight: float) -
         if not _is_straight(points, between, straight):
             cut += [k % n for k in range(a + 1, b) if not exact[k % n]]
     cut = sorted(cut) if corners else [k for k in range(n) if not exact[k]]
+    if straight > STRAIGHT:
+        ends = cut[1:] + cut[:1]
+        cut = [a for a, b in zip(cut, ends, strict=True) if math.dist(at[a], at[b]) > straight]
     if len(cut) < 3:
         raise TopologyError(NO_RING)
     ends = [*cut[1:], cut[0] + n]

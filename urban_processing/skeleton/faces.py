@@ -166,8 +166,8 @@ def check_faces(
     """Raise `Unresolved` unless faces are those of a straight skeleton.
 
     Each ring must be simple and turn counter-clockwise, all its vertices must be as high as they
-    are far from the line of its edge, and it must be monotone along that line. Their arcs fit
-    together by construction, so that such faces tile the polygon.
+    are far from the line of its edge, and it must be monotone along that line. Their areas
+    must add up: as their arcs fit together by construction, they then tile the polygon.
 
     Parameters
     ----------
@@ -197,6 +197,12 @@ def check_faces(
         raise Unresolved
     ring = points[at]
     along = np.append(dx, 0.0)[at] * ring[:, 0] + np.append(dy, 0.0)[at] * ring[:, 1]
+    whole = sum(
+        contour.x[e] * contour.y[after] - contour.y[e] * contour.x[after]
+        for e, after in enumerate(contour.following)
+    )
+    if abs(2 * shapely.area(polygons).sum() - whole) > 8 * HEIGHT_TOLERANCE * contour.size:
+        raise Unresolved
     _check_monotone(along, ring, closed)
 
 

@@ -15,6 +15,8 @@ from urban_processing.skeleton.contour import Contour
 
 PARALLEL = 1e-10
 """Sine of the angle of two edges that face each other below which they meet all at once."""
+NEARLY_PARALLEL = 1e-4
+"""Sine above which the gap of edges that face each other is never less than the tolerance."""
 WELL_CROSSED = 1e-2
 """Sine of the angle above which the crossing of two lines says where a vertex is."""
 JUMP, COLLAPSE, SPLIT = 0, 1, 2
@@ -259,6 +261,8 @@ class _Wavefront:
         heads = [v for v in here if self.prev[v] not in here]
         if len(here) < 2 and len(heads) + len(hit) < 2:
             return False
+        if len(heads) == len(here) and not hit and len({self.node[v] for v in here}) == 1:
+            return False  # they part here
         node = len(self.arcs.x)
         self.arcs.x.append(x)
         self.arcs.y.append(y)
@@ -337,7 +341,7 @@ class _Wavefront:
         turned.sort(key=lambda item: item[0])
         for k, (start, stop, _) in enumerate(turned):
             after = (turned[(k + 1) % len(turned)][0] - start) % (2 * math.pi)
-            if (stop - start) % (2 * math.pi) > after + 1e-9:
+            if (stop - start) % (2 * math.pi) > after + NEARLY_PARALLEL:
                 raise Unresolved
         return [item[2] for item in turned]
 
@@ -350,4 +354,20 @@ class _Wavefront:
         self.prev.append(u)
         self.next[u] = v
         self.prev[w] = v
+        if self._closed(v, u, w, node):
+            self.bx[v], self.by[v] = self.arcs.x[node], self.arcs.y[node]
+            self.vx[v] = self.vy[v] = 0.0
+            self.jumps[v], self.reflex[v] = True, False
         return v
+
+    def _closed(self, v: int, u: int, w: int, node: int) -> bool:
+        """Tell whether nothing is left between two edges that face each other at a vertex."""
+        c, arcs = self.contour, self.arcs
+        a, b = self.left[v], self.right[v]
+        det = abs(c.dx[a] * c.dy[b] - c.dy[a] * c.dx[b])
+        if det > NEARLY_PARALLEL or c.dx[a] * c.dx[b] + c.dy[a] * c.dy[b] > 0:
+            return False
+        x, y, t = arcs.x[node], arcs.y[node], arcs.t[node]
+        back = -self._along(u, x, y, t, c.dx[b], c.dy[b])
+        ahead = -self._along(w, x, y, t, c.dx[b], c.dy[b])
+        return 0 < min(back, ahead) < self.tolerance / max(det, PARALLEL)
