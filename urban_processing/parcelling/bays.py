@@ -191,15 +191,18 @@ def bays_of(sheet: Sheet, strip: Strip, *, reach: float) -> list[Bay]:
 
 
 def _guides(sheet: Sheet, strip: Strip, reach: float) -> dict[int, Guide]:
-    """Guides away from the ends, without those that cross others: they run back along the back."""
+    """Guides away from the ends; one that is lacking, or crosses others, is the one before it."""
     front = strip.front
     along = [0.0, *accumulate(sheet.distance(u, v) for u, v in pairwise(front))]
-    limit = float(len(strip.back) - 1)
+    limit, mark = float(len(strip.back) - 1), None
     guides = {}
     for k in range(1, len(front) - 1):
-        guide = strip.guides.get(front[k])
-        near = min(along[k], along[-1] - along[k]) < reach
-        if guide is not None and guide[0] <= limit and not near:
-            guides[front[k]] = guide
-            limit = guide[0]
+        vertex = front[k]
+        if vertex not in strip.corners or min(along[k], along[-1] - along[k]) < reach:
+            continue
+        guide = strip.guides.get(vertex)
+        if guide is not None and guide[0] <= limit:
+            limit, mark = guide[0], guide
+        if mark is not None:
+            guides[vertex] = mark
     return guides

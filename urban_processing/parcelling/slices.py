@@ -12,7 +12,7 @@ from typing import NamedTuple
 from urban_processing.parcelling.bays import Bay, Hit, bays_of
 from urban_processing.parcelling.sheet import Sheet
 from urban_processing.parcelling.sight import sees
-from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
+from urban_processing.parcelling.spacing import CLEARANCE, END, Bounds, Profile, shares_of
 from urban_processing.parcelling.strips import Strip
 
 STEP = 0.5
@@ -21,9 +21,9 @@ STEP = 0.5
 CLOSE = 0.1
 """Lines that end this near to a vertex of the back, in metres, end there."""
 
-TRIES = ((1.0, True, 1.01), (1.0, False, 1.01), (0.0, False, 1.05))
+TRIES = ((1.0, True, CLEARANCE), (1.0, False, CLEARANCE), (0.0, False, 1.05))
 """Shares of ω, whether lines are moved to vertices, and margins over the smallest area, in the
-order in which they are tried. Areas of a profile are a little off, hence the margins."""
+order in which they are tried."""
 
 
 class Cut(NamedTuple):
@@ -155,6 +155,7 @@ class Slicer:
         profile = self.profile()
         aim = profile.number()
         for count in range(aim, 1, -1):
+            cuts: list[Cut] = []
             for irregularity, snap, margin in TRIES:
                 shares = shares_of(
                     draws[:count], irregularity * self.bounds.irregularity, self.bounds
@@ -166,8 +167,10 @@ class Slicer:
                 if ends is None:
                     continue
                 cuts = [self.cut(s, hits.get(s) or self._cast(s)) for s in ends]
-                if self._within_bounds(cuts):
+                if len(self._kept(cuts)) == len(cuts):
                     return [cut for cut in cuts if self._clear(cut)], aim
+            if cuts:
+                return [cut for cut in self._kept(cuts) if self._clear(cut)], aim
         return [], aim
 
     def _moved(self, hits: dict[float, Hit], s: float) -> float:
@@ -208,12 +211,20 @@ class Slicer:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
         return (s, self._joined(hit)) if best is None else best[1:]
 
-    def _within_bounds(self, cuts: list[Cut]) -> bool:
-        """Whether no parcel is too small and no lines cross."""
-        areas = [0.0, *(self.area_before(cut) for cut in cuts), self.area]
-        return all(high - low >= self.bounds.min_area for low, high in pairwise(areas)) and all(
-            later.hit.at <= before.hit.at + 1e-9 for before, later in pairwise(cuts)
-        )
+    def _kept(self, cuts: list[Cut]) -> list[Cut]:
+        """Leave out lines that cross one before, or leave too small a parcel."""
+        least = self.bounds.min_area
+        kept: list[Cut] = []
+        areas = [0.0]
+        for cut in cuts:
+            area = self.area_before(cut)
+            if area - areas[-1] >= least and (not kept or cut.hit.at <= kept[-1].hit.at + 1e-9):
+                kept.append(cut)
+                areas.append(area)
+        while kept and self.area - areas[-1] < least:
+            kept.pop()
+            areas.pop()
+        return kept
 
     def _clear(self, cut: Cut) -> bool:
         """Whether a line runs within the strip."""
