@@ -72,6 +72,15 @@ def divide_in_rows(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     Pieces
         Parcels, and patios of perimeter blocks.
 
+    Notes
+    -----
+    Where this departs from the paper: the standard deviation of widths is ω/3 of their mean;
+    fronts are shared out so that areas, too, keep their bounds where they can; lines are straight
+    from the street to the rear and fanned beside bends, where the paper's follow arcs of the
+    skeleton; strips at a sharp corner are one row only as far as two would be too shallow; a
+    small parcel goes to the neighbour with which it is compact, not by the border alone.
+    Triangles that are large enough and have their frontage stay.
+
     References
     ----------
     C. A. Vanegas et al. (2012). Procedural generation of parcels in urban modeling. Computer

@@ -241,14 +241,9 @@ class Slicer:
         start, place = front[0], 0
         end = (last, back[last])
         for cut in cuts:
-            if cut.share * (self.s[cut.place + 1] - self.s[cut.place]) < 1e-6:
-                vertex, passed = front[cut.place], cut.place
-            elif (1.0 - cut.share) * (self.s[cut.place + 1] - self.s[cut.place]) < 1e-6:
-                vertex, passed = front[cut.place + 1], cut.place + 1
-            else:
-                u, v = front[cut.place], front[cut.place + 1]
-                vertex = sheet.add_on(u, v, cut.share)
-                passed = cut.place + 1
+            u, v = front[cut.place], front[cut.place + 1]
+            vertex = sheet.insert(u, v, cut.share)
+            passed = cut.place if vertex == u else cut.place + 1
             edge = min(math.floor(cut.hit.at), last - 1)
             rear = sheet.insert(back[edge], back[edge + 1], cut.hit.at - edge)
             begin = (edge + 1, rear) if rear == back[edge + 1] else (edge, rear)
