@@ -324,7 +324,7 @@ def blocks(draw: st.DrawFn) -> shapely.Polygon:
     return shapely.set_precision(polygon, 2.0**-20)
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     polygon=blocks(),
     streets=st.lists(st.booleans(), min_size=1, max_size=40),
@@ -366,7 +366,7 @@ def test_real_blocks(city: str, offset: float) -> None:
     assert not small.any()
 
 
-def real_blocks(city: str, count: int = 60) -> list[shapely.Polygon]:
+def real_blocks(city: str, count: int = 36) -> list[shapely.Polygon]:
     pyogrio = pytest.importorskip("pyogrio")
     path = NETWORKS / f"{city}.gpkg"
     if not path.exists():

@@ -22,7 +22,7 @@ from urban_processing.parcelling.divided import (
 )
 from urban_processing.parcelling.ground import Ground, Pieces, Rules
 from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.mending import Needs, beta_strips
+from urban_processing.parcelling.mending import beta_strips
 from urban_processing.parcelling.patios import joined, patio_faces, rows_and_patios
 from urban_processing.parcelling.plots import Plots, edges_of
 from urban_processing.parcelling.sheet import Sheet
@@ -31,6 +31,7 @@ from urban_processing.parcelling.spacing import Bounds
 from urban_processing.parcelling.streets import logical_streets, sides_of_rings
 from urban_processing.parcelling.strips import Strip, alpha_strips
 from urban_processing.parcelling.tidy import divide_large, tidy
+from urban_processing.parcelling.uniting import Needs
 from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 LEAST_FRONT = 0.75
@@ -138,7 +139,7 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     )
     strips = _alpha_strips(sheet, polygon, skeleton, corner=float(rules.corner[k]), needs=needs)
     inside = {edge for patio in patios for ring in patio for edge in edges_of(ring)}
-    strips, left = beta_strips(sheet, strips, needs, inside)
+    strips, left = beta_strips(sheet, strips, needs=needs, patio=inside)
     if left:
         patios = joined(sheet, patios, [strip.ring for strip in left])
     parts = [_lots(sheet, polygon, strip, bounds, seed=seed, wary=wary) for strip in strips]
@@ -207,4 +208,4 @@ def _plots(sheet: Sheet, polygon: Polygon, parts: Sequence[tuple[Strip, list[Lot
             polygons += shapes
             own = child(lineage, k)
             seeds += [own] + [child(own, j) for j in range(1, len(shapes))]
-    return Plots(sheet, polygons, seeds, polygon.access)
+    return Plots(sheet, polygons, seeds, access=polygon.access)

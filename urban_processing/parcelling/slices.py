@@ -10,8 +10,8 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from urban_processing.parcelling.bays import Bay, Hit, bays_of
-from urban_processing.parcelling.mending import sees
 from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.sight import sees
 from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
 from urban_processing.parcelling.strips import Strip
 
@@ -61,9 +61,8 @@ class Slicer:
 
     def __init__(self, sheet: Sheet, strip: Strip, bounds: Bounds) -> None:
         self.sheet, self.strip, self.bounds = sheet, strip, bounds
-        self.bays = bays_of(sheet, strip)
         self.ring = strip.ring
-        self.starts = [bay.start for bay in self.bays]
+        self.bays: list[Bay] = []
         front, back = strip.front, strip.back
         self.s = [0.0, *accumulate(sheet.distance(u, v) for u, v in pairwise(front))]
         self.x0, self.y0 = sheet.x[front[0]], sheet.y[front[0]]
@@ -83,7 +82,7 @@ class Slicer:
 
     def bay_at(self, s: float) -> Bay:
         """Return the bay at a length along the front."""
-        return self.bays[max(bisect.bisect_right(self.starts, s) - 1, 0)]
+        return self.bays[max(bisect.bisect_right(self.bays, s, key=_start) - 1, 0)]
 
     def cut(self, s: float, hit: Hit) -> Cut:
         """Return the line from a length along the front to a point of the back."""
@@ -141,8 +140,21 @@ class Slicer:
         draws
             Numbers in [0, 1), as many as there can be parcels.
         """
+        self.bays = bays_of(self.sheet, self.strip, reach=self.bounds.min_width)
+        cuts, aim = self._cuts(draws)
+        if len(cuts) + 1 < aim:
+            straight, self.bays = self.bays, bays_of(self.sheet, self.strip, reach=0.0)
+            fanned, _ = self._cuts(draws)
+            if len(fanned) > len(cuts):
+                return fanned
+            self.bays = straight
+        return cuts
+
+    def _cuts(self, draws: list[float]) -> tuple[list[Cut], int]:
+        """Return lines, and how many parcels were aimed at."""
         profile = self.profile()
-        for count in range(profile.number(), 1, -1):
+        aim = profile.number()
+        for count in range(aim, 1, -1):
             for irregularity, snap, margin in TRIES:
                 shares = shares_of(
                     draws[:count], irregularity * self.bounds.irregularity, self.bounds
@@ -155,8 +167,8 @@ class Slicer:
                     continue
                 cuts = [self.cut(s, hits.get(s) or self._cast(s)) for s in ends]
                 if self._within_bounds(cuts):
-                    return [cut for cut in cuts if self._clear(cut)]
-        return []
+                    return [cut for cut in cuts if self._clear(cut)], aim
+        return [], aim
 
     def _moved(self, hits: dict[float, Hit], s: float) -> float:
         """Move a line to a vertex of the front, or to where another row's line ends."""
@@ -207,7 +219,7 @@ class Slicer:
         """Whether a line runs within the strip."""
         bay = self.bay_at(cut.s)
         px, py = bay.x + (cut.s - bay.start) * bay.dx, bay.y + (cut.s - bay.start) * bay.dy
-        return sees(self.sheet, self.ring, (px, py), (cut.hit.x, cut.hit.y))
+        return sees(self.sheet, self.ring, p=(px, py), q=(cut.hit.x, cut.hit.y))
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:
         """Add the ends of the lines to the sheet; return the parts of the strip between them."""
@@ -284,6 +296,10 @@ def _loops(ring: list[int]) -> list[list[int]]:
         at[v] = len(chain)
         chain.append(v)
     return loops
+
+
+def _start(bay: Bay) -> float:
+    return bay.start
 
 
 def _unmoved(s: float) -> float:
