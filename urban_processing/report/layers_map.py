@@ -49,7 +49,11 @@ _GROUND = ("blocks", "parcels")
 
 
 def plot_layers(
-    made: LayerSet, path: str | PathLike[str] | None = None, *, title: str = ""
+    made: LayerSet,
+    path: str | PathLike[str] | None = None,
+    *,
+    ax: Axes | None = None,
+    title: str = "",
 ) -> Figure:
     """Draw a map of blocks, and of the parcels in them.
 
@@ -61,6 +65,8 @@ def plot_layers(
         Layers of which one is called blocks or parcels.
     path
         File to write: ``.png``, ``.svg`` or ``.pdf``. The same layers give the same SVG.
+    ax
+        Axes to draw into, by default a new figure in the shape of the land.
     title
         Heading, none by default.
 
@@ -77,7 +83,8 @@ def plot_layers(
     if ground is None:
         raise ParameterError(f"There is nothing to draw in {made.kind}: no block and no parcel.")
     extent = extent_of(ground.shapes)
-    ax = new_axes(extent, title=title, longer=_longer_side(tables))
+    if ax is None:
+        ax = new_axes(extent, title=title, longer=_longer_side(tables))
     frame_land(ax, extent)
     _draw(ax, tables, scale_of(ax, tables.get("parcels", ground)["area_m2"]))
     figure = root_figure(ax)
