@@ -172,6 +172,12 @@ def test_perimeter_blocks_have_a_patio_of_the_rest() -> None:
     assert shapely.area(pieces.polygons()[~pieces.patio]).min() >= A_MIN
 
 
+def test_where_a_patio_would_be_narrow_rows_meet() -> None:
+    polygon = shapely.box(0, 0, 160, 60)
+    assert not divided(polygon, offset=25.0).patio.any()
+    assert divided(polygon, offset=23.0).patio.any()
+
+
 def test_a_patio_takes_in_a_hole_without_street_and_a_rim_without_one() -> None:
     polygon = shapely.box(0, 0, 200, 160) - shapely.Point(100, 80).buffer(15, quad_segs=6)
     pieces = divided(polygon, offset=25.0)

@@ -134,7 +134,7 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     except TopologyError:
         return whole(polygon)
     skeleton, patios = rows_and_patios(
-        skeleton, offset=float(rules.offset[k]), area=area, min_area=bounds.min_area
+        skeleton, offset=float(rules.offset[k]), area=area, bounds=bounds
     )
     sheet = Sheet(skeleton.xy, skeleton.height, polygon.following)
     needs = Needs(
