@@ -31,7 +31,7 @@ from urban_processing.pipelines.subdivide import subdivide
 from urban_processing.processes import process_pool
 from urban_processing.site import snap_to_grid
 
-MIN_AREA = {Strategy.OBB: 200.0, Strategy.SKELETON: 140.0}
+MIN_AREA = {Strategy.OBB: 200.0, Strategy.SKELETON: 110.0}
 """Smallest parcels in m² that make some 94 parcels of a block; 200 for other strategies."""
 
 REPEATS = 15

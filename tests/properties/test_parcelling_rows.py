@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from urban_processing.blocks.model import rings_of
 from urban_processing.mesh.planar import BoolArray, FloatArray
 from urban_processing.parcelling.ground import Ground, Pieces, Rules
-from urban_processing.parcelling.rows import divide_in_rows
+from urban_processing.parcelling.rows.divide import divide_in_rows
 
 NETWORKS = Path(__file__).resolve().parents[3] / "shared/data/redistributable/networks"
 A_MIN = 400.0

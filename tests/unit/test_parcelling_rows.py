@@ -10,15 +10,15 @@ import shapely
 
 from urban_processing.blocks.model import plain_blocks
 from urban_processing.hashing import splitmix64
-from urban_processing.parcelling.divided import Polygon
-from urban_processing.parcelling.lineage import child, mix
-from urban_processing.parcelling.plots import Place, Plots
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.sight import sees
-from urban_processing.parcelling.spacing import Bounds, Profile, shares_of
-from urban_processing.parcelling.streets import Street, logical_streets, sides_of_rings
-from urban_processing.parcelling.strips import alpha_strips
-from urban_processing.parcelling.tidy import divide_large, tidy
+from urban_processing.parcelling.rows.divided import Polygon
+from urban_processing.parcelling.rows.lineage import child, mix
+from urban_processing.parcelling.rows.plots import Place, Plots
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.sight import sees
+from urban_processing.parcelling.rows.spacing import Bounds, Profile, shares_of
+from urban_processing.parcelling.rows.streets import Street, logical_streets, sides_of_rings
+from urban_processing.parcelling.rows.strips import alpha_strips
+from urban_processing.parcelling.rows.tidy import divide_large, tidy
 from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 BOUNDS = Bounds(

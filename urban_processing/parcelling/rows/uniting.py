@@ -6,8 +6,8 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise
 
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.strips import Strip
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.strips import Strip
 
 
 @dataclass(frozen=True)

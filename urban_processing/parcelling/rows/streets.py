@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from urban_processing.parcelling.divided import Polygon
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.rows.divided import Polygon
+from urban_processing.parcelling.rows.sheet import Sheet
 
 NAMED_BEND = 15.0
 """Bend in degrees at which another number of the street makes another logical street."""

@@ -11,7 +11,8 @@ from urban_processing.errors import TopologyError
 from urban_processing.hashing import uniform
 from urban_processing.mesh.corners import ring_areas
 from urban_processing.mesh.planar import IntArray
-from urban_processing.parcelling.divided import (
+from urban_processing.parcelling.ground import Ground, Pieces, Rules
+from urban_processing.parcelling.rows.divided import (
     Divided,
     Face,
     Polygon,
@@ -20,18 +21,17 @@ from urban_processing.parcelling.divided import (
     straightened,
     whole,
 )
-from urban_processing.parcelling.ground import Ground, Pieces, Rules
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.mending import beta_strips
-from urban_processing.parcelling.patios import joined, patio_faces, rows_and_patios
-from urban_processing.parcelling.plots import Plots, edges_of
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.slices import Lot, Slicer, rings_of_lots
-from urban_processing.parcelling.spacing import Bounds
-from urban_processing.parcelling.streets import logical_streets, sides_of_rings
-from urban_processing.parcelling.strips import Strip, alpha_strips
-from urban_processing.parcelling.tidy import divide_large, tidy
-from urban_processing.parcelling.uniting import Needs
+from urban_processing.parcelling.rows.lineage import child
+from urban_processing.parcelling.rows.mending import beta_strips
+from urban_processing.parcelling.rows.patios import joined, patio_faces, rows_and_patios
+from urban_processing.parcelling.rows.plots import Plots, edges_of
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.slices import Lot, Slicer, rings_of_lots
+from urban_processing.parcelling.rows.spacing import Bounds
+from urban_processing.parcelling.rows.streets import logical_streets, sides_of_rings
+from urban_processing.parcelling.rows.strips import Strip, alpha_strips
+from urban_processing.parcelling.rows.tidy import divide_large, tidy
+from urban_processing.parcelling.rows.uniting import Needs
 from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 LEAST_FRONT = 0.75

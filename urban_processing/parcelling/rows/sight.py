@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.rows.sheet import Sheet
 
 TOUCH = 1e-3
 """A line that passes a vertex nearer than this, in metres, touches it."""

@@ -9,11 +9,11 @@ from functools import partial
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
-from urban_processing.parcelling.bays import Bay, Hit, bays_of
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.sight import sees
-from urban_processing.parcelling.spacing import CLEARANCE, END, Bounds, Profile, shares_of
-from urban_processing.parcelling.strips import Strip
+from urban_processing.parcelling.rows.bays import Bay, Hit, bays_of
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.sight import sees
+from urban_processing.parcelling.rows.spacing import CLEARANCE, END, Bounds, Profile, shares_of
+from urban_processing.parcelling.rows.strips import Strip
 
 STEP = 0.5
 """Distance of the places where the depth of a strip is measured, over the smallest width."""

@@ -6,10 +6,10 @@ import math
 from collections.abc import Set
 from itertools import pairwise
 
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.sight import sees
-from urban_processing.parcelling.strips import Strip
-from urban_processing.parcelling.uniting import Needs, give_rims, rank_of, unite
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.sight import sees
+from urban_processing.parcelling.rows.strips import Strip
+from urban_processing.parcelling.rows.uniting import Needs, give_rims, rank_of, unite
 
 SHARP = 0.5
 """Sine of half the angle of a corner from which the strips along it are rows back to back."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.rows.lineage import child
+from urban_processing.parcelling.rows.sheet import Sheet
 
 
 @dataclass(frozen=True)

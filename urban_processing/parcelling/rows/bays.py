@@ -7,8 +7,8 @@ import math
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.strips import Guide, Strip
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.strips import Guide, Strip
 
 TINY = 1e-6
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.streets import Side, Street
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.streets import Side, Street
 
 RIDGE = math.cos(math.radians(100.0))
 """Cosine of the angle from which two sides of one street have their backs to each other."""

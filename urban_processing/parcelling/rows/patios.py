@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urban_processing.mesh.corners import ring_areas
-from urban_processing.parcelling.divided import Face
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.plots import edges_of
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.spacing import Bounds
+from urban_processing.parcelling.rows.divided import Face
+from urban_processing.parcelling.rows.lineage import child
+from urban_processing.parcelling.rows.plots import edges_of
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.spacing import Bounds
 from urban_processing.skeleton.straight import Skeleton, cut_at_depth
 
 Ring = list[int]
