@@ -23,6 +23,7 @@ from parcel_grounds import (
 )
 
 from urban_processing.access_rule import reached_frontage
+from urban_processing.parcelling.boxes import divide
 from urban_processing.parcelling.boxes.divide import divide_by_boxes
 from urban_processing.parcelling.ground import join_parts
 

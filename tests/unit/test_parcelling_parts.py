@@ -16,6 +16,7 @@ from parcel_grounds import (
     with_holes,
 )
 
+from urban_processing.parcelling.boxes import divide
 from urban_processing.parcelling.boxes.divide import divide_by_boxes
 from urban_processing.parcelling.boxes.line_cuts import THE_CUT, Lines, cut
 from urban_processing.parcelling.boxes.oriented import smallest_boxes

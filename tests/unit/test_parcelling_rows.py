@@ -9,9 +9,8 @@ import pytest
 import shapely
 
 from urban_processing.blocks.model import plain_blocks
-from urban_processing.hashing import splitmix64
+from urban_processing.hashing import child, mix, splitmix64
 from urban_processing.parcelling.rows.divided import Polygon
-from urban_processing.parcelling.rows.lineage import child, mix
 from urban_processing.parcelling.rows.plots import Place, Plots
 from urban_processing.parcelling.rows.sheet import Sheet
 from urban_processing.parcelling.rows.sight import sees

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from urban_processing.errors import TopologyError
-from urban_processing.hashing import uniform
+from urban_processing.hashing import child, uniform
 from urban_processing.mesh.corners import ring_areas
 from urban_processing.mesh.planar import IntArray
 from urban_processing.parcelling.ground import Ground, Pieces, Rules
@@ -21,7 +21,6 @@ from urban_processing.parcelling.rows.divided import (
     straightened,
     whole,
 )
-from urban_processing.parcelling.rows.lineage import child
 from urban_processing.parcelling.rows.mending import beta_strips
 from urban_processing.parcelling.rows.patios import joined, patio_faces, rows_and_patios
 from urban_processing.parcelling.rows.plots import Plots, edges_of

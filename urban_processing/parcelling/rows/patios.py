@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from urban_processing.hashing import child
 from urban_processing.mesh.corners import ring_areas
 from urban_processing.parcelling.rows.divided import Face
-from urban_processing.parcelling.rows.lineage import child
 from urban_processing.parcelling.rows.plots import edges_of
 from urban_processing.parcelling.rows.sheet import Sheet
 from urban_processing.parcelling.rows.spacing import Bounds

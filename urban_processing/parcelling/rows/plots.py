@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from urban_processing.parcelling.rows.lineage import child
+from urban_processing.hashing import child
 from urban_processing.parcelling.rows.sheet import Sheet
 
 
