@@ -58,7 +58,7 @@ def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     if name not in _RULES:
         return None
     rules = list(_RULES[name]())
-    if layer is SUBDIVIDED_PARCELS:  # over what the other rules draw of an irregular patio
+    if layer == SUBDIVIDED_PARCELS:  # over what the other rules draw of an irregular patio
         rules.append(_Rule("Patio", f"\"land_use\" = '{PATIO_USE}'", [_fill(_GREEN)], "fill"))
     if name == "parcels" and "irregularity" not in layer.column_names:
         rules = _changed()  # parcels that were not measured, but carried over

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from urban_processing.errors import ParameterError
+from urban_processing.metrics.subdivisions import PATIO_USE
 from urban_processing.report.figure import (
     checked,
     extent_of,
@@ -138,14 +139,14 @@ def _colours(parcels: Table) -> Any:
     if "irregularity" not in parcels.columns:
         return PARCEL
     colours = parcel_colours(parcels)
-    colours[parcels["land_use"] == "patio"] = to_rgb(PATIO)
+    colours[parcels["land_use"] == PATIO_USE] = to_rgb(PATIO)
     return colours
 
 
 def _parcel_entries(parcels: Table) -> list[Patch]:
     if "irregularity" not in parcels.columns:
         return [swatch(PARCEL, f"{len(parcels):,} parcels")]
-    patio = parcels["land_use"] == "patio"
+    patio = parcels["land_use"] == PATIO_USE
     entries = parcel_entries(Table({k: v[~patio] for k, v in parcels.columns.items()}))
     if patio.any():
         n = int(patio.sum())
