@@ -10,17 +10,17 @@ import argparse
 import io
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import geopandas as gpd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
-from shapely import LineString
+from shapely import LineString, Point
 
 import urban_processing as up
-from urban_processing.io.frames import GeoLayout
+from urban_processing.io.frames import GeoLayers, GeoLayout
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images" / "gallery"
@@ -33,7 +33,7 @@ COLOURS = 256
 
 MOST_BYTES = 250_000
 
-Panel = tuple[str, GeoLayout]
+Panel = tuple[str, GeoLayout | GeoLayers]
 
 
 def laid_out(name: str, **parameters: object) -> GeoLayout:
@@ -230,6 +230,97 @@ def dimensions() -> Figure:
     return sheet(panels, columns=2, ratio=0.9)
 
 
+STREETS = ("aleppo", "auckland", "salt_lake_city", "schaan", "wuhan")
+"""Sample networks of streets."""
+
+
+@cache
+def blocks_of(name: str) -> GeoLayers:
+    """Blocks between the streets of a sample."""
+    return up.find_blocks(ROOT / "sample_data" / f"streets_{name}.gpkg")
+
+
+def strategies(name: str) -> Figure:
+    """Blocks of a real network of streets in every strategy (Vanegas 2012, section 4)."""
+    ways: dict[str, dict[str, object]] = {
+        "skeleton": {},
+        "skeleton with an open patio": {"offset": 32},
+        "hybrid": {"strategy": "hybrid", "offset": 32},
+        "obb": {"strategy": "obb"},
+        "obb without access": {"strategy": "obb", "street_access": 0},
+        "streamline": {"strategy": "streamline"},
+    }
+    panels: list[Panel] = []
+    for title, way in ways.items():
+        made = up.subdivide(blocks_of(name), min_area=400, **way)
+        lots = made.parcels[made.parcels.land_use != "patio"]
+        four = (lots.sides == 4).mean()
+        panels.append((f"{title}: {len(lots):,} parcels, {four:.0%} with four sides", made))
+    x0, y0, x1, y1 = blocks_of(name).blocks.total_bounds
+    return sheet(panels, columns=3, ratio=(y1 - y0) / (x1 - x0))
+
+
+def last_levels() -> Figure:
+    """Co-generation whose last level each strategy makes."""
+    panels: list[Panel] = []
+    for strategy in ("streamline", "skeleton", "obb", "hybrid"):
+        layout = laid_out("irregular_64ha", min_area=1500, strategy=strategy)
+        mean = figure(layout, "irregularity_mean")
+        count = figure(layout, "parcels")
+        panels.append((f"{strategy}: {count:.0f} parcels, I = {mean:.3f}", layout))
+    return sheet(panels, columns=2, ratio=0.9)
+
+
+CHANGES = {
+    "kept": "#eceade",
+    "moved": "#b9d4e8",
+    "split": "#f3c98b",
+    "new": "#ef9f7d",
+}
+"""Colours of what became of parcels."""
+
+
+def edits() -> Figure:
+    """Parcels that stay themselves while streets are edited (Vanegas 2012, Fig. 7)."""
+    x0, y0 = 500_000.0, 5_250_000.0
+    streets = [LineString([(x0 + 150 * i, y0), (x0 + 150 * i, y0 + 330)]) for i in range(4)]
+    streets += [LineString([(x0, y0 + 110 * j), (x0 + 450, y0 + 110 * j)]) for j in range(4)]
+    bent = LineString([(x0, y0 + 110), (x0 + 225, y0 + 135), (x0 + 450, y0 + 110)])
+    new = LineString([(x0 + 225, y0 + 220), (x0 + 225, y0 + 330)])
+    wider = [12.0] * 5 + [26.0] + [12.0] * 2
+    states = {
+        "before": (streets, [12.0] * 8),
+        "a street bent": ([*streets[:5], bent, *streets[6:]], [12.0] * 8),
+        "a street widened": (streets, wider),
+        "a street added": ([*streets, new], [12.0] * 9),
+    }
+    drawn = Figure(figsize=(2 * COLUMN, 1.65 * COLUMN), facecolor="white")
+    FigureCanvasAgg(drawn)
+    before, house = None, None
+    for k, (title, (lines, widths)) in enumerate(states.items()):
+        layer = gpd.GeoDataFrame({"width_m": widths}, geometry=lines, crs="EPSG:32632")
+        made = up.subdivide(up.find_blocks(layer), min_area=350, previous=before)
+        before = made if before is None else before
+        ax = drawn.add_axes(((k % 2) / 2 + 0.01, 0.51 - (k // 2) / 2, 0.48, 0.45))
+        parcels, label = made.parcels, title
+        colour = CHANGES["kept"]
+        if "changes" in made.made.names:
+            log = made.changes[made.changes.change.isin(CHANGES)]
+            change = log.set_index("new_id").change
+            parcels = parcels.assign(change=parcels.parcel_id.map(change))
+            colour = parcels.change.map(CHANGES)
+            counted = parcels.change.value_counts()
+            label += ": " + ", ".join(f"{n} {name}" for name, n in counted.items())
+        parcels.plot(ax=ax, color=colour, edgecolor="#77736a", linewidth=0.5)
+        if house is None:
+            at = Point(x0 + 180, y0 + 140)
+            house = int(parcels.parcel_id[parcels.contains(at)].iloc[0])
+        parcels[parcels.parcel_id == house].plot(ax=ax, color="#2b5f9e")
+        ax.axis("off")
+        ax.set_title(label, loc="left", size=11)
+    return drawn
+
+
 PICTURES: dict[str, Callable[[], Figure]] = {
     "lands": six_lands,
     "sizes": three_sizes,
@@ -240,6 +331,9 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "rights_of_way": rights_of_way,
     "orientation": two_orientations,
     "dimensions": dimensions,
+    **{f"strategies_{name}": partial(strategies, name) for name in STREETS},
+    "last_levels": last_levels,
+    "edits": edits,
 }
 """Name of a picture's file, and the function that makes it."""
 
@@ -266,7 +360,7 @@ def main() -> None:
     IMAGES.mkdir(parents=True, exist_ok=True)
     for name in names:
         write(PICTURES[name](), IMAGES / f"{name}.png")
-        print(f"{name}: {PICTURES[name].__doc__}")
+        print(name)
 
 
 if __name__ == "__main__":

@@ -40,15 +40,12 @@ def _steps() -> Iterator[float]:
     for dock in window.findChildren(QDockWidget):
         dock.setVisible(dock.objectName() in ("Layers", "ProcessingToolbox"))
     window.showMaximized()
-    land = QgsVectorLayer(str(SAMPLES / "schellenberg.gpkg"), "schellenberg")
-    QgsProject.instance().addMapLayer(land)
-    QgsProject.instance().setCrs(land.crs())
-    iface.zoomToActiveLayer()
+    land = _load("schellenberg", "boundary")
     toolbox = window.findChild(QDockWidget, "ProcessingToolbox")
     tree = toolbox.findChild(QTreeView)
     yield 2
 
-    toolbox.searchBox.setText("parcels")
+    toolbox.searchBox.setText("urban planning")
     tree.expandAll()
     yield 2
     toolbox.setFloating(True)
@@ -56,29 +53,66 @@ def _steps() -> Iterator[float]:
     yield 1
     _save(toolbox, IMAGES / "qgis_toolbox.png")
 
-    algorithm = QgsApplication.processingRegistry().createAlgorithmById(
-        "urban_processing:cogenerate"
-    )
-    dialog = AlgorithmDialog(algorithm, parent=window)
-    dialog.setParameters({"BOUNDARY": land.id(), "PARCELS": 500, "PATTERN": 1})
+    dialog = _dialog("cogenerate", {"BOUNDARY": land.id(), "PARCELS": 500, "PATTERN": 1})
     dialog.resize(1000, 820)
     dialog.show()
     yield 2
     _save(dialog, IMAGES / "qgis_dialog.png")
-
-    dialog.runButton().click()
-    yield from _until(lambda: len(QgsProject.instance().mapLayers()) > 4)
-    dialog.close()
+    yield from _run(dialog, "Parcels")
     toolbox.setVisible(False)
-    QgsProject.instance().layerTreeRoot().findLayer(land.id()).setItemVisibilityChecked(False)
-    parcels = QgsProject.instance().mapLayersByName("Parcels")[0]
-    QgsProject.instance().setCrs(parcels.crs())
+    yield from _show("Parcels", hidden=[land])
+    _save(window, IMAGES / "qgis_result.png")
+
+    QgsProject.instance().clear()
+    streets = _load("streets_auckland", "streets")
+    yield from _run(_dialog("blocks", {"STREETS": streets.id()}), "Blocks")
+    blocks, edges = (
+        QgsProject.instance().mapLayersByName(n)[0] for n in ("Blocks", "Edges of blocks")
+    )
+    given = {"BLOCKS": blocks.id(), "STREETS": edges.id(), "MIN_AREA": 400}
+    yield from _run(_dialog("subdivide", given), "Parcels")
+    yield from _show("Parcels", hidden=[streets, blocks, edges])
+    _save(window, IMAGES / "qgis_subdivide.png")
+
+
+def _load(sample: str, layer: str) -> QgsVectorLayer:
+    """Load a layer of a sample, and zoom to it."""
+    loaded = QgsVectorLayer(f"{SAMPLES / sample}.gpkg|layername={layer}", sample)
+    QgsProject.instance().addMapLayer(loaded)
+    QgsProject.instance().setCrs(loaded.crs())
+    iface.zoomToActiveLayer()
+    return loaded
+
+
+def _dialog(name: str, parameters: dict[str, object]) -> AlgorithmDialog:
+    registry = QgsApplication.processingRegistry()
+    algorithm = registry.createAlgorithmById(f"urban_processing:{name}")
+    dialog = AlgorithmDialog(algorithm, parent=iface.mainWindow())
+    dialog.setParameters(parameters)
+    return dialog
+
+
+def _run(dialog: AlgorithmDialog, layer: str) -> Iterator[float]:
+    """Run an algorithm and wait for one of its layers."""
+    dialog.show()
+    yield 1
+    dialog.runButton().click()
+    yield from _until(lambda: bool(QgsProject.instance().mapLayersByName(layer)))
+    dialog.close()
+
+
+def _show(name: str, *, hidden: list[QgsVectorLayer]) -> Iterator[float]:
+    """Fill the map with a layer, without some others."""
+    root = QgsProject.instance().layerTreeRoot()
+    for layer in hidden:
+        root.findLayer(layer.id()).setItemVisibilityChecked(False)
+    shown = QgsProject.instance().mapLayersByName(name)[0]
+    QgsProject.instance().setCrs(shown.crs())
     canvas = iface.mapCanvas()
-    canvas.setExtent(canvas.mapSettings().layerExtentToOutputExtent(parcels, parcels.extent()))
+    canvas.setExtent(canvas.mapSettings().layerExtentToOutputExtent(shown, shown.extent()))
     canvas.zoomByFactor(1.05)
     canvas.refresh()
     yield 4
-    _save(window, IMAGES / "qgis_result.png")
 
 
 def _until(true: Callable[[], bool], seconds: float = 60) -> Iterator[float]:

@@ -17,7 +17,10 @@ from qgis.core import (
 from qgis.PyQt.QtXml import QDomDocument
 
 from urban_processing.layout_file.styles import layer_style
+from urban_processing.persistence.layers import CHANGES
 from urban_processing.schema import (
+    BLOCK_EDGES,
+    BLOCKS,
     ISSUES,
     JUNCTIONS,
     LAYERS,
@@ -31,8 +34,21 @@ from urban_processing.schema import (
 if TYPE_CHECKING:
     from qgis_plugin.provider import UrbanProcessingProvider
 
-_FROM_TOP = (ISSUES, JUNCTIONS, STREETS, RIGHT_OF_WAY, NET_PARCELS, PARCELS)
-"""Layers from top to bottom; the others lie below in the order of the schema."""
+_FROM_TOP = tuple(
+    layer.name
+    for layer in (
+        ISSUES,
+        JUNCTIONS,
+        STREETS,
+        BLOCK_EDGES,
+        RIGHT_OF_WAY,
+        NET_PARCELS,
+        CHANGES,
+        PARCELS,
+        BLOCKS,
+    )
+)
+"""Layers from top to bottom, by name; the others lie below in the order of the schema."""
 
 
 class ResultGroup:
@@ -141,4 +157,4 @@ def _results(project: QgsProject) -> QgsLayerTreeGroup:
 
 
 def _rank(layer: Layer) -> int:
-    return _FROM_TOP.index(layer) if layer in _FROM_TOP else len(_FROM_TOP)
+    return _FROM_TOP.index(layer.name) if layer.name in _FROM_TOP else len(_FROM_TOP)

@@ -7,6 +7,8 @@ import numpy.typing as npt
 
 UintArray = npt.NDArray[np.uint64]
 
+_MASK = 2**64 - 1
+
 
 def splitmix64(values: UintArray) -> UintArray:
     """Mix 64-bit integers (Steele et al. 2014, SplitMix); vectorised, no state."""
@@ -23,3 +25,16 @@ def uniform(seed: int, lineage: UintArray, n_draws: int) -> npt.NDArray[np.float
     count = np.arange(1, n_draws + 1).astype(np.uint64)
     draws = splitmix64(np.asarray(start[:, None] + count, dtype=np.uint64))
     return np.asarray((draws >> np.uint64(11)).astype(np.float64) * 2.0**-53)
+
+
+def mix(value: int) -> int:
+    """Mix one 64-bit integer as `splitmix64` does, without an array."""
+    z = (value + 0x9E3779B97F4A7C15) & _MASK
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+    return z ^ (z >> 31)
+
+
+def child(parent: int, rank: int) -> int:
+    """Return the lineage of the part of a thing that has a rank among its parts."""
+    return mix(parent ^ mix(rank + 1))

@@ -23,9 +23,9 @@ from parcel_grounds import (
 )
 
 from urban_processing.access_rule import reached_frontage
-from urban_processing.parcelling import obb
+from urban_processing.parcelling.boxes import divide
+from urban_processing.parcelling.boxes.divide import divide_by_boxes
 from urban_processing.parcelling.ground import join_parts
-from urban_processing.parcelling.obb import divide_by_boxes
 
 NETWORKS = Path(__file__).parents[3] / "shared" / "data" / "redistributable" / "networks"
 SHAPES = {
@@ -220,7 +220,7 @@ def test_how_many_are_worked_on_at_once_does_not_matter(monkeypatch):
     ground = ground_of(some_blocks())
     rules = rules_of(len(ground), 100.0)
     one = divide_by_boxes(ground, rules, seed=1)
-    monkeypatch.setattr(obb, "PARCELS_AT_ONCE", 100)
+    monkeypatch.setattr(divide, "PARCELS_AT_ONCE", 100)
     two = divide_by_boxes(ground, rules, seed=1)
     assert_tiled(two, ground)
     np.testing.assert_array_equal(one.lineage, two.lineage)

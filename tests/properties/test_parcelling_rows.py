@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from urban_processing.blocks.model import rings_of
 from urban_processing.mesh.planar import BoolArray, FloatArray
 from urban_processing.parcelling.ground import Ground, Pieces, Rules
-from urban_processing.parcelling.rows import divide_in_rows
+from urban_processing.parcelling.rows.divide import divide_in_rows
 
 NETWORKS = Path(__file__).resolve().parents[3] / "shared/data/redistributable/networks"
 A_MIN = 400.0
@@ -172,6 +172,12 @@ def test_perimeter_blocks_have_a_patio_of_the_rest() -> None:
     assert shapely.area(pieces.polygons()[~pieces.patio]).min() >= A_MIN
 
 
+def test_where_a_patio_would_be_narrow_rows_meet() -> None:
+    polygon = shapely.box(0, 0, 160, 60)
+    assert not divided(polygon, offset=25.0).patio.any()
+    assert divided(polygon, offset=23.0).patio.any()
+
+
 def test_a_patio_takes_in_a_hole_without_street_and_a_rim_without_one() -> None:
     polygon = shapely.box(0, 0, 200, 160) - shapely.Point(100, 80).buffer(15, quad_segs=6)
     pieces = divided(polygon, offset=25.0)
@@ -324,7 +330,7 @@ def blocks(draw: st.DrawFn) -> shapely.Polygon:
     return shapely.set_precision(polygon, 2.0**-20)
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     polygon=blocks(),
     streets=st.lists(st.booleans(), min_size=1, max_size=40),
@@ -366,7 +372,7 @@ def test_real_blocks(city: str, offset: float) -> None:
     assert not small.any()
 
 
-def real_blocks(city: str, count: int = 60) -> list[shapely.Polygon]:
+def real_blocks(city: str, count: int = 36) -> list[shapely.Polygon]:
     pyogrio = pytest.importorskip("pyogrio")
     path = NETWORKS / f"{city}.gpkg"
     if not path.exists():

@@ -16,14 +16,14 @@ from parcel_grounds import (
     with_holes,
 )
 
-from urban_processing.parcelling import obb
-from urban_processing.parcelling.boxes import smallest_boxes
+from urban_processing.parcelling.boxes import divide
+from urban_processing.parcelling.boxes.divide import divide_by_boxes
+from urban_processing.parcelling.boxes.line_cuts import THE_CUT, Lines, cut
+from urban_processing.parcelling.boxes.oriented import smallest_boxes
+from urban_processing.parcelling.boxes.sweep import sweep_along
 from urban_processing.parcelling.compose import ground_of_faces, replace_faces
-from urban_processing.parcelling.line_cuts import THE_CUT, Lines, cut
 from urban_processing.parcelling.noding import Segments, node_rings
-from urban_processing.parcelling.obb import divide_by_boxes
 from urban_processing.parcelling.rings import Rings
-from urban_processing.parcelling.sweep import sweep_along
 
 
 def rings_of_shapes(shapes):
@@ -188,7 +188,7 @@ def test_faces_that_noding_breaks_are_taken_back(monkeypatch):
         asked.append(noded.n_faces)
         return np.arange(noded.n_faces) == (2 if len(asked) == 1 else -1)
 
-    monkeypatch.setattr(obb, "_broken", broken_once)
+    monkeypatch.setattr(divide, "_broken", broken_once)
     mended = divide_by_boxes(ground, rules, seed=3)
     assert_tiled(mended, ground)
     assert mended.n_faces < plain.n_faces == asked[0]

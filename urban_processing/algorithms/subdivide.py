@@ -10,6 +10,7 @@ from urban_processing.algorithms.outputs import layer_outputs
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind
 from urban_processing.params.subdivide import SubdivideParams, per_block_parameters
 from urban_processing.parcelling.layers import SUBDIVISION
+from urban_processing.persistence.layers import CHANGES
 from urban_processing.progress import Progress
 
 
@@ -78,7 +79,7 @@ SUBDIVIDE = AlgorithmSpec(
         "the parcels",
         label="File of parcels",
         help="A GeoPackage with the parcels, the blocks with their parameters, and issues.",
-        layers=SUBDIVISION,
+        layers=(*SUBDIVISION, CHANGES),
     ),
     run=_run,
     parallel=True,

@@ -183,11 +183,17 @@ class GeoLayers:
 
         return write_layers(self.made, path, overwrite=overwrite, record_seconds=record_seconds)
 
-    def plot(self, path: str | PathLike[str] | None = None, *, title: str = "") -> Figure:
+    def plot(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        ax: Axes | None = None,
+        title: str = "",
+    ) -> Figure:
         """Draw a map; see `urban_processing.report.layers_map.plot_layers`."""
         from urban_processing.report.layers_map import plot_layers
 
-        return plot_layers(self.made, path, title=title)
+        return plot_layers(self.made, path, ax=ax, title=title)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(t):,} {each.name}" for each, t in self.made.tables.items())

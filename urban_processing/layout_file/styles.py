@@ -6,6 +6,8 @@ import xml.etree.ElementTree as ET  # nosec B405: written here, never parsed
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from urban_processing.metrics.subdivisions import PATIO_USE
+from urban_processing.parcelling.layers import SUBDIVIDED_PARCELS
 from urban_processing.schema import GeometryType, Layer
 
 QML_VERSION = "3.22.0"
@@ -17,6 +19,7 @@ _METRES, _MILLIMETRES = "RenderMetersInMapUnits", "MM"
 _PAPER = "246,244,238,215"
 _OUTLINE = "140,134,124,255"
 _SURFACE = "217,213,203,255"
+_GREEN = "213,227,198,255"
 _TRIANGLE = "182,160,214,230"
 _REDS = ("247,200,186,230", "238,140,116,230", "214,69,56,235")
 _STREET, _CASING = "255,204,70,255", "133,102,26,255"
@@ -54,7 +57,9 @@ def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     name = layer.name
     if name not in _RULES:
         return None
-    rules = _RULES[name]()
+    rules = list(_RULES[name]())
+    if layer == SUBDIVIDED_PARCELS:  # over what the other rules draw of an irregular patio
+        rules.append(_Rule("Patio", f"\"land_use\" = '{PATIO_USE}'", [_fill(_GREEN)], "fill"))
     if name == "parcels" and "irregularity" not in layer.column_names:
         rules = _changed()  # parcels that were not measured, but carried over
     if places_only and layer.geometry is GeometryType.ANY:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +16,7 @@ from urban_processing.metrics.parcels import ParcelMeasures, ParcelRings, measur
 from urban_processing.parcelling.layers import SUBDIVIDED_BLOCKS, SUBDIVIDED_PARCELS
 from urban_processing.parcelling.rules import rule_values
 from urban_processing.parcelling.subdivision import Subdivision
+from urban_processing.persistence.layers import CHANGES
 from urban_processing.schema import ISSUES
 from urban_processing.tables import (
     LayerSet,
@@ -96,6 +98,7 @@ class MeasuredSubdivision:
                 SUBDIVIDED_PARCELS: self._parcel_table(),
                 SUBDIVIDED_BLOCKS: self._block_table(),
                 ISSUES: issue_table(made.issues, made.blocks.frame),
+                **({} if made.changes is None else {CHANGES: made.changes}),
             },
             frame=made.blocks.frame,
             history=made.history,
@@ -164,6 +167,9 @@ class MeasuredSubdivision:
                 f"{p.reached[parcels].mean():.1%} at a street",
             ),
         ]
+        if self.made.changes is not None:
+            count = Counter(self.made.changes["change"].tolist())
+            rows.append(("changes", ", ".join(f"{n:,} {name}" for name, n in count.items())))
         if pieces.patio.any():
             rows.append(("patios", f"{int(pieces.patio.sum()):,}"))
         if self.made.issues:

@@ -10,6 +10,7 @@ import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Self
 
 from urban_processing.errors import ParameterError
@@ -93,8 +94,7 @@ class Params:
     @classmethod
     def fields(cls) -> tuple[ParamField, ...]:
         """Return the declared parameters in order."""
-        hints = typing.get_type_hints(cls, include_extras=True)
-        return tuple(_field(f.name, hints[f.name], f.default) for f in dataclasses.fields(cls))
+        return _fields_of(cls)  # type: ignore[arg-type]  # classes are hashable, whatever theirs are
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any], layers: Collection[str] = ()) -> Self:
@@ -152,6 +152,12 @@ class Params:
 
 Naming = Callable[[str], str]
 """Gives the name of a parameter as the user knows it."""
+
+
+@cache
+def _fields_of(cls: type[Params]) -> tuple[ParamField, ...]:
+    hints = typing.get_type_hints(cls, include_extras=True)
+    return tuple(_field(f.name, hints[f.name], f.default) for f in dataclasses.fields(cls))
 
 
 def _field(name: str, hint: Any, default: Any) -> ParamField:

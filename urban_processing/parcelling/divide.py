@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from urban_processing.params.subdivide import Patio, Strategy
+from urban_processing.parcelling.boxes.divide import divide_by_boxes
 from urban_processing.parcelling.compose import ground_of_faces, replace_faces
 from urban_processing.parcelling.ground import Ground, Pieces, Rules, join_parts
-from urban_processing.parcelling.obb import divide_by_boxes
-from urban_processing.parcelling.rows import divide_in_rows
+from urban_processing.parcelling.rows.divide import divide_in_rows
 from urban_processing.parcelling.rules import BlockRules
 from urban_processing.parcelling.streamline import divide_by_streamlines
 

@@ -12,7 +12,6 @@ import shapely
 
 from urban_processing.blocks.model import BlockRings, ragged_rows
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.site import FINE_GRID as FINE_GRID
 
 UintArray = npt.NDArray[np.uint64]
 

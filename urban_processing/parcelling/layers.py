@@ -81,4 +81,4 @@ SUBDIVIDED_BLOCKS = Layer(
 """Blocks with the parameters that held for each; a layer like this may be given again."""
 
 SUBDIVISION: tuple[Layer, ...] = (SUBDIVIDED_PARCELS, SUBDIVIDED_BLOCKS, ISSUES, PROVENANCE)
-"""All layers of a subdivision."""
+"""All layers of a subdivision; one that goes on from another has `CHANGES` besides."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.parcelling.line_cuts import TOUCH
+from urban_processing.parcelling.boxes.line_cuts import TOUCH
 from urban_processing.parcelling.rings import Rings, ranges, starts
 
 

@@ -14,6 +14,7 @@ from urban_processing.parcelling.ground import Pieces
 from urban_processing.parcelling.rules import BlockRules
 from urban_processing.provenance import Step
 from urban_processing.site import Issue
+from urban_processing.tables import Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,8 @@ class Subdivision:
         (F,) numbers of the parcels, unique.
     issues
         What the blocks do not allow, parcel by parcel.
+    changes
+        What became of the parcels of the subdivision before; None where there is none.
     history
         Steps that made it, oldest first.
     """
@@ -44,6 +47,7 @@ class Subdivision:
     pieces: Pieces
     parcel_id: IntArray
     issues: tuple[Issue, ...]
+    changes: Table | None
     history: tuple[Step, ...]
 
     @cached_property

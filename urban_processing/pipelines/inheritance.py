@@ -15,6 +15,7 @@ from urban_processing.parcelling.ground import Ground, Pieces
 from urban_processing.parcelling.reuse import Parcels, Previous, pieces_of_parcels
 from urban_processing.parcelling.subdivision import Subdivision
 from urban_processing.persistence.block_match import NONE, carry_block_columns
+from urban_processing.persistence.tables import changes_table
 from urban_processing.persistence.transfer import ParcelsInBlocks, transfer
 from urban_processing.site import Frame
 
@@ -75,19 +76,18 @@ def unchanged(
 
 
 def with_numbers(previous: Previous, made: Subdivision) -> Subdivision:
-    """Give parcels the numbers of those before the edit that they are."""
-    old = previous.parcels
+    """Give parcels the numbers of those before the edit that they are; log what changed."""
     origin, frame = previous.blocks.frame, made.blocks.frame
+    polygons = _shifted(previous.parcels.polygons, origin, frame)
+    outlines = _shifted(previous.blocks.polygons, origin, frame)
+    number = previous.parcel_id
     found = transfer(
-        ParcelsInBlocks(
-            _shifted(old.polygons, origin, frame),
-            old.block,
-            _shifted(previous.blocks.polygons, origin, frame),
-        ),
-        previous.parcel_id,
+        ParcelsInBlocks(polygons, previous.parcels.block, outlines),
+        number,
         ParcelsInBlocks(made.polygons, made.pieces.block, made.blocks.polygons),
     )
-    return dataclasses.replace(made, parcel_id=found.parcel_id)
+    changes = changes_table(found, (number, polygons), made.polygons, frame)
+    return dataclasses.replace(made, parcel_id=found.parcel_id, changes=changes)
 
 
 def _shifted(

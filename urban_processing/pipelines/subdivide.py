@@ -79,6 +79,7 @@ def subdivide(
         pieces=pieces,
         parcel_id=np.arange(1, pieces.n_faces + 1),
         issues=blocks.issues,
+        changes=None,
         history=(),
     )
     if previous is not None:

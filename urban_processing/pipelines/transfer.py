@@ -23,6 +23,7 @@ from urban_processing.persistence.layers import (
     TRANSFERRED_PARCELS,
     Change,
 )
+from urban_processing.persistence.tables import changes_table, numbers_of
 from urban_processing.persistence.transfer import ParcelsInBlocks, Transfer, in_blocks, labelled
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
@@ -72,7 +73,9 @@ def transfer(editions: Editions, params: TransferParams, progress: Progress = SI
     progress.update(0.9, "Carrying columns over")
     issues += _said(made, editions)
     columns = _carried(before, after, made, names, params)
-    tables = dict([_parcels(editions, made, old_id, columns), _changes(editions, made, old_id)])
+    tables = dict([_parcels(editions, made, old_id, columns)])
+    old = old_id, before.polygons
+    tables[CHANGES] = changes_table(made, old, after.polygons, editions.frame)
     notes = (*editions.issues, *issues)
     if notes:
         tables[ISSUES] = issue_table(notes, editions.frame)
@@ -201,29 +204,7 @@ def _parcels(
         "parcel_id": made.parcel_id,
         "area_m2": shapely.area(polygons),
         "change": made.changes.change[: len(polygons)],
-        "old_id": _number_of(old_id, made.part_of),
+        "old_id": numbers_of(old_id, made.part_of),
     }
     sorted_values = {name: v[order] for name, v in {**declared, **values}.items()}
     return layer, make_table(layer, sorted_values, to_map(polygons[order], editions.frame))
-
-
-def _changes(editions: Editions, made: Transfer, old_id: IntArray) -> tuple[Layer, Table]:
-    log, m = made.changes, len(made.parcel_id)
-    shape = np.append(editions.after.polygons, editions.before.polygons[log.old[m:]])
-    number = _number_of(old_id, log.old), _number_of(made.parcel_id, log.new)
-    order = np.lexsort((number[0], number[1], np.arange(len(shape)) >= m))
-    values = {
-        "change": log.change,
-        "old_id": number[0],
-        "new_id": number[1],
-        "overlap_old": log.overlap_old,
-        "overlap_new": log.overlap_new,
-        "distance": log.distance,
-    }
-    rows = {name: v[order] for name, v in values.items()}
-    return CHANGES, make_table(CHANGES, rows, to_map(shape[order], editions.frame))
-
-
-def _number_of(numbers: IntArray, rows: IntArray) -> npt.NDArray[np.float64]:
-    """(n,) numbers by row, NaN for `NONE`."""
-    return np.append(numbers.astype(np.float64), np.nan)[rows]

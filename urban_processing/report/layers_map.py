@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from urban_processing.errors import ParameterError
+from urban_processing.metrics.subdivisions import PATIO_USE
 from urban_processing.report.figure import (
     checked,
     extent_of,
@@ -49,7 +50,11 @@ _GROUND = ("blocks", "parcels")
 
 
 def plot_layers(
-    made: LayerSet, path: str | PathLike[str] | None = None, *, title: str = ""
+    made: LayerSet,
+    path: str | PathLike[str] | None = None,
+    *,
+    ax: Axes | None = None,
+    title: str = "",
 ) -> Figure:
     """Draw a map of blocks, and of the parcels in them.
 
@@ -61,6 +66,8 @@ def plot_layers(
         Layers of which one is called blocks or parcels.
     path
         File to write: ``.png``, ``.svg`` or ``.pdf``. The same layers give the same SVG.
+    ax
+        Axes to draw into, by default a new figure in the shape of the land.
     title
         Heading, none by default.
 
@@ -77,7 +84,8 @@ def plot_layers(
     if ground is None:
         raise ParameterError(f"There is nothing to draw in {made.kind}: no block and no parcel.")
     extent = extent_of(ground.shapes)
-    ax = new_axes(extent, title=title, longer=_longer_side(tables))
+    if ax is None:
+        ax = new_axes(extent, title=title, longer=_longer_side(tables))
     frame_land(ax, extent)
     _draw(ax, tables, scale_of(ax, tables.get("parcels", ground)["area_m2"]))
     figure = root_figure(ax)
@@ -131,14 +139,14 @@ def _colours(parcels: Table) -> Any:
     if "irregularity" not in parcels.columns:
         return PARCEL
     colours = parcel_colours(parcels)
-    colours[parcels["land_use"] == "patio"] = to_rgb(PATIO)
+    colours[parcels["land_use"] == PATIO_USE] = to_rgb(PATIO)
     return colours
 
 
 def _parcel_entries(parcels: Table) -> list[Patch]:
     if "irregularity" not in parcels.columns:
         return [swatch(PARCEL, f"{len(parcels):,} parcels")]
-    patio = parcels["land_use"] == "patio"
+    patio = parcels["land_use"] == PATIO_USE
     entries = parcel_entries(Table({k: v[~patio] for k, v in parcels.columns.items()}))
     if patio.any():
         n = int(patio.sum())

@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.parcelling.candidates import Contour, Faces, View, view_along
-from urban_processing.parcelling.line_cuts import TOUCH, Cut, Lines, cut
-from urban_processing.parcelling.quality import BAD, GOOD, quality_of_halves, quality_of_pieces
+from urban_processing.parcelling.boxes.candidates import Contour, Faces, View, view_along
+from urban_processing.parcelling.boxes.line_cuts import TOUCH, Cut, Lines, cut
+from urban_processing.parcelling.boxes.quality import (
+    BAD,
+    GOOD,
+    quality_of_halves,
+    quality_of_pieces,
+)
 from urban_processing.parcelling.rings import changes, ranges
 from urban_processing.site import AREA_ROUNDING
 

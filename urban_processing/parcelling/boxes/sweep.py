@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from urban_processing.mesh.planar import FloatArray, IntArray
-from urban_processing.parcelling.boxes import Boxes
+from urban_processing.parcelling.boxes.oriented import Boxes
 from urban_processing.parcelling.rings import Rings, ranges
 
 AREA_PRECISION = 1e-12

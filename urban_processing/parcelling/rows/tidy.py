@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from urban_processing.parcelling.plots import Place, Plots
-from urban_processing.parcelling.spacing import Bounds
+from urban_processing.parcelling.rows.plots import Place, Plots
+from urban_processing.parcelling.rows.spacing import Bounds
 
 LEAST_FRONT = 0.4
 """Shortest frontage of a parcel, over the smallest width."""

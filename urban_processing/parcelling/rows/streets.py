@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from urban_processing.parcelling.divided import Polygon
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.rows.divided import Polygon
+from urban_processing.parcelling.rows.sheet import Sheet
 
 NAMED_BEND = 15.0
 """Bend in degrees at which another number of the street makes another logical street."""
@@ -98,14 +98,15 @@ def sides_of_rings(sheet: Sheet, polygon: Polygon, edge_face: Sequence[int]) -> 
         stops = starts[1:] + starts[:1]
         rings.append(
             [
-                _side(sheet, polygon, edge_face[k], k, stop)
+                _side(sheet, polygon, (k, stop), face=edge_face[k])
                 for k, stop in zip(starts, stops, strict=True)
             ]
         )
     return rings
 
 
-def _side(sheet: Sheet, polygon: Polygon, face: int, start: int, stop: int) -> Side:
+def _side(sheet: Sheet, polygon: Polygon, ends: tuple[int, int], *, face: int) -> Side:
+    start, stop = ends
     run = [start]
     while run[-1] != stop or len(run) == 1:
         run.append(sheet.following[run[-1]])
@@ -192,7 +193,7 @@ def _positions(ring: Sequence[Side]) -> list[float]:
     return at
 
 
-def _chord(ring: Sequence[Side], first: int, step: int, reach: float) -> tuple[float, float]:
+def _chord(ring: Sequence[Side], first: int, *, step: int, reach: float) -> tuple[float, float]:
     """Vector from the beginning of side ``first`` to the point ``reach`` on along the ring.
 
     With a ``step`` of -1 it goes back from the end of ``first``.
@@ -216,8 +217,8 @@ def _bends(ring: Sequence[Side], reach: float) -> list[float]:
     reach = min(reach, 0.25 * sum(side.length for side in ring))
     bends = []
     for k in range(len(ring)):
-        bx, by = _chord(ring, (k - 1) % len(ring), -1, reach)
-        fx, fy = _chord(ring, k, 1, reach)
+        bx, by = _chord(ring, (k - 1) % len(ring), step=-1, reach=reach)
+        fx, fy = _chord(ring, k, step=1, reach=reach)
         angle = math.atan2(fx * by - fy * bx, -(bx * fx + by * fy))
         bends.append(round(math.degrees(angle), 6))
     return bends
@@ -243,7 +244,7 @@ def _corners(
                 break
         else:
             found.add(k)
-    return {k for k in found if not _near(k, taken, at, reach)}
+    return {k for k in found if not _near(k, taken, at, reach=reach)}
 
 
 def _tight_turns(
@@ -252,7 +253,7 @@ def _tight_turns(
     """Sides that begin where a street turns inwards by more than a corner within the depth."""
     bends = _bends(ring, depth)
     clear = [
-        bend if bend > 0.0 and not _near(k, taken, at, 2.0 * depth) else 0.0
+        bend if bend > 0.0 and not _near(k, taken, at, reach=2.0 * depth) else 0.0
         for k, bend in enumerate(bends)
     ]
     return _corners(clear, at, corner=corner, reach=depth, taken=taken)
@@ -272,11 +273,11 @@ def _renamed(
         if min(ring[k].street, ring[k - 1].street) >= 0
         and ring[k].street != ring[k - 1].street
         and abs(bends[k]) > NAMED_BEND
-        and not _near(k, taken, at, reach)
+        and not _near(k, taken, at, reach=reach)
     }
 
 
-def _near(k: int, taken: set[int], at: Sequence[float], reach: float) -> bool:
+def _near(k: int, taken: set[int], at: Sequence[float], *, reach: float) -> bool:
     apart = [(at[other] - at[k]) % at[-1] for other in taken]
     return any(min(a, at[-1] - a) < 0.5 * reach for a in apart)
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.parcelling.boxes import Boxes
-from urban_processing.parcelling.line_cuts import TOUCH
+from urban_processing.parcelling.boxes.line_cuts import TOUCH
+from urban_processing.parcelling.boxes.oriented import Boxes
+from urban_processing.parcelling.boxes.sweep import Sweep, sweep_along
 from urban_processing.parcelling.rings import Rings, changes
-from urban_processing.parcelling.sweep import Sweep, sweep_along
 from urban_processing.site import AREA_ROUNDING
 
 CLEAR_OF_LEAST = 1e-6

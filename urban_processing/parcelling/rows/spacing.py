@@ -16,6 +16,12 @@ m², which has another meaning for each mean width."""
 MARGIN = 1.1
 """Parcels are meant to be this much above the smallest area, and below the largest."""
 
+CLEARANCE = 1.01
+"""Least factor by which parcels keep away from the bounds of areas: a profile is a little off."""
+
+WIDER = 1.001
+"""Least width over the smallest one."""
+
 END = 1e-4
 """Share of a front within which area counts as that of an end that leans outwards."""
 
@@ -95,8 +101,17 @@ class Profile:
             for (s, t), (low, high) in zip(pairwise(self.spots), pairwise(self.areas), strict=True)
         )
         number = max(math.floor(self.numbers[-1] + 0.5), math.ceil(least - 1e-6))
-        most = min(self.length / b.min_width, self.areas[-1] / b.min_area)
-        return max(min(number, math.floor(most + 1e-6)), 1)
+        return max(min(number, self._most()), 1)
+
+    def _most(self) -> int:
+        """Number of parcels if each is as small as it may be."""
+        b = self.bounds
+        width, area = b.min_width * WIDER, b.min_area * CLEARANCE
+        count, s = 0, 0.0
+        while s < self.length and self.areas[-1] - (before := self.area_at(s)) >= area:
+            s = max(s + width, self.spot_of(before + area))
+            count += s <= self.length + 1e-6
+        return count
 
     def ends(
         self,
@@ -121,16 +136,18 @@ class Profile:
         """
         b = self.bounds
         count = len(shares)
-        area, width = b.min_area * margin, b.min_width * min(margin, 1.001)
+        area, width = b.min_area * margin, b.min_width * WIDER
         most = b.max_area / margin
-        latest, earliest = [self.length], [self.length]
+        latest = [self.length]
         for _ in range(count):
             s = latest[-1]
             latest.append(min(s - width, self.spot_of(self.area_at(s) - area)))
+            if latest[-1] < -1e-6:
+                return None
+        earliest = [self.length]
+        for _ in range(count - 1):
             s = earliest[-1]
             earliest.append(max(s - b.max_width, self.spot_of(self.area_at(s) - most)))
-        if latest[-1] < -1e-6:
-            return None
         ends: list[float] = []
         at = 0.0
         for k, share in enumerate(shares[:-1]):

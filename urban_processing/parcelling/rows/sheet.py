@@ -10,9 +10,9 @@ from itertools import pairwise
 import shapely
 
 from urban_processing.mesh.planar import FloatArray
-from urban_processing.parcelling.ground import FINE_GRID
+from urban_processing.site import FINE_GRID
 
-SAME = 1e-5
+SAME = 0.05
 """Points of an edge that lie nearer to each other, in metres, are one."""
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.parcelling.ground import FINE_GRID
 from urban_processing.parcelling.rings import Rings, changes, ranges, starts
+from urban_processing.site import FINE_GRID
 
 TOUCH = 2.0**-20
 """A line within this distance of a vertex, in metres, goes through it."""

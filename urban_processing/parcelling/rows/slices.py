@@ -9,11 +9,11 @@ from functools import partial
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
-from urban_processing.parcelling.bays import Bay, Hit, bays_of
-from urban_processing.parcelling.mending import sees
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.spacing import END, Bounds, Profile, shares_of
-from urban_processing.parcelling.strips import Strip
+from urban_processing.parcelling.rows.bays import Bay, Hit, bays_of
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.sight import sees
+from urban_processing.parcelling.rows.spacing import CLEARANCE, END, Bounds, Profile, shares_of
+from urban_processing.parcelling.rows.strips import Strip
 
 STEP = 0.5
 """Distance of the places where the depth of a strip is measured, over the smallest width."""
@@ -21,9 +21,9 @@ STEP = 0.5
 CLOSE = 0.1
 """Lines that end this near to a vertex of the back, in metres, end there."""
 
-TRIES = ((1.0, True, 1.01), (1.0, False, 1.01), (0.0, False, 1.05))
+TRIES = ((1.0, True, CLEARANCE), (1.0, False, CLEARANCE), (0.0, False, 1.05))
 """Shares of ω, whether lines are moved to vertices, and margins over the smallest area, in the
-order in which they are tried. Areas of a profile are a little off, hence the margins."""
+order in which they are tried."""
 
 
 class Cut(NamedTuple):
@@ -61,9 +61,8 @@ class Slicer:
 
     def __init__(self, sheet: Sheet, strip: Strip, bounds: Bounds) -> None:
         self.sheet, self.strip, self.bounds = sheet, strip, bounds
-        self.bays = bays_of(sheet, strip)
         self.ring = strip.ring
-        self.starts = [bay.start for bay in self.bays]
+        self.bays: list[Bay] = []
         front, back = strip.front, strip.back
         self.s = [0.0, *accumulate(sheet.distance(u, v) for u, v in pairwise(front))]
         self.x0, self.y0 = sheet.x[front[0]], sheet.y[front[0]]
@@ -83,7 +82,7 @@ class Slicer:
 
     def bay_at(self, s: float) -> Bay:
         """Return the bay at a length along the front."""
-        return self.bays[max(bisect.bisect_right(self.starts, s) - 1, 0)]
+        return self.bays[max(bisect.bisect_right(self.bays, s, key=_start) - 1, 0)]
 
     def cut(self, s: float, hit: Hit) -> Cut:
         """Return the line from a length along the front to a point of the back."""
@@ -141,8 +140,22 @@ class Slicer:
         draws
             Numbers in [0, 1), as many as there can be parcels.
         """
+        self.bays = bays_of(self.sheet, self.strip, reach=self.bounds.min_width)
+        cuts, aim = self._cuts(draws)
+        if len(cuts) + 1 < aim:
+            straight, self.bays = self.bays, bays_of(self.sheet, self.strip, reach=0.0)
+            fanned, _ = self._cuts(draws)
+            if len(fanned) > len(cuts):
+                return fanned
+            self.bays = straight
+        return cuts
+
+    def _cuts(self, draws: list[float]) -> tuple[list[Cut], int]:
+        """Return lines, and how many parcels were aimed at."""
         profile = self.profile()
-        for count in range(profile.number(), 1, -1):
+        aim = profile.number()
+        for count in range(aim, 1, -1):
+            cuts: list[Cut] = []
             for irregularity, snap, margin in TRIES:
                 shares = shares_of(
                     draws[:count], irregularity * self.bounds.irregularity, self.bounds
@@ -154,9 +167,11 @@ class Slicer:
                 if ends is None:
                     continue
                 cuts = [self.cut(s, hits.get(s) or self._cast(s)) for s in ends]
-                if self._within_bounds(cuts):
-                    return [cut for cut in cuts if self._clear(cut)]
-        return []
+                if len(self._kept(cuts)) == len(cuts):
+                    return [cut for cut in cuts if self._clear(cut)], aim
+            if cuts:
+                return [cut for cut in self._kept(cuts) if self._clear(cut)], aim
+        return [], aim
 
     def _moved(self, hits: dict[float, Hit], s: float) -> float:
         """Move a line to a vertex of the front, or to where another row's line ends."""
@@ -196,18 +211,26 @@ class Slicer:
                 best = (gap, origin + bay.start, Hit(edge + share, x, y))
         return (s, self._joined(hit)) if best is None else best[1:]
 
-    def _within_bounds(self, cuts: list[Cut]) -> bool:
-        """Whether no parcel is too small and no lines cross."""
-        areas = [0.0, *(self.area_before(cut) for cut in cuts), self.area]
-        return all(high - low >= self.bounds.min_area for low, high in pairwise(areas)) and all(
-            later.hit.at <= before.hit.at + 1e-9 for before, later in pairwise(cuts)
-        )
+    def _kept(self, cuts: list[Cut]) -> list[Cut]:
+        """Leave out lines that cross one before, or leave too small a parcel."""
+        least = self.bounds.min_area
+        kept: list[Cut] = []
+        areas = [0.0]
+        for cut in cuts:
+            area = self.area_before(cut)
+            if area - areas[-1] >= least and (not kept or cut.hit.at <= kept[-1].hit.at + 1e-9):
+                kept.append(cut)
+                areas.append(area)
+        while kept and self.area - areas[-1] < least:
+            kept.pop()
+            areas.pop()
+        return kept
 
     def _clear(self, cut: Cut) -> bool:
         """Whether a line runs within the strip."""
         bay = self.bay_at(cut.s)
         px, py = bay.x + (cut.s - bay.start) * bay.dx, bay.y + (cut.s - bay.start) * bay.dy
-        return sees(self.sheet, self.ring, (px, py), (cut.hit.x, cut.hit.y))
+        return sees(self.sheet, self.ring, p=(px, py), q=(cut.hit.x, cut.hit.y))
 
     def lots(self, cuts: list[Cut]) -> list[Lot]:
         """Add the ends of the lines to the sheet; return the parts of the strip between them."""
@@ -218,14 +241,9 @@ class Slicer:
         start, place = front[0], 0
         end = (last, back[last])
         for cut in cuts:
-            if cut.share * (self.s[cut.place + 1] - self.s[cut.place]) < 1e-6:
-                vertex, passed = front[cut.place], cut.place
-            elif (1.0 - cut.share) * (self.s[cut.place + 1] - self.s[cut.place]) < 1e-6:
-                vertex, passed = front[cut.place + 1], cut.place + 1
-            else:
-                u, v = front[cut.place], front[cut.place + 1]
-                vertex = sheet.add_on(u, v, cut.share)
-                passed = cut.place + 1
+            u, v = front[cut.place], front[cut.place + 1]
+            vertex = sheet.insert(u, v, cut.share)
+            passed = cut.place if vertex == u else cut.place + 1
             edge = min(math.floor(cut.hit.at), last - 1)
             rear = sheet.insert(back[edge], back[edge + 1], cut.hit.at - edge)
             begin = (edge + 1, rear) if rear == back[edge + 1] else (edge, rear)
@@ -284,6 +302,10 @@ def _loops(ring: list[int]) -> list[list[int]]:
         at[v] = len(chain)
         chain.append(v)
     return loops
+
+
+def _start(bay: Bay) -> float:
+    return bay.start
 
 
 def _unmoved(s: float) -> float:

@@ -9,14 +9,20 @@ import numpy as np
 from urban_processing.access_rule import MEASURED_M, reached_frontage
 from urban_processing.hashing import splitmix64, uniform
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.parcelling.boxes import Boxes, smallest_boxes
-from urban_processing.parcelling.candidates import Contour, Faces
-from urban_processing.parcelling.cut_tree import Level, Tree, collected, leaves_in_order, taken_back
+from urban_processing.parcelling.boxes.candidates import Contour, Faces
+from urban_processing.parcelling.boxes.cut_tree import (
+    Level,
+    Tree,
+    collected,
+    leaves_in_order,
+    taken_back,
+)
+from urban_processing.parcelling.boxes.halving import Halved, halve
+from urban_processing.parcelling.boxes.line_cuts import THE_CUT
+from urban_processing.parcelling.boxes.oriented import Boxes, smallest_boxes
+from urban_processing.parcelling.boxes.quality import fronts_of
 from urban_processing.parcelling.ground import Ground, Pieces, Rules, join_parts
-from urban_processing.parcelling.halving import Halved, halve
-from urban_processing.parcelling.line_cuts import THE_CUT
 from urban_processing.parcelling.noding import Segments, node_rings
-from urban_processing.parcelling.quality import fronts_of
 from urban_processing.parcelling.rings import Rings, join_rings, ranges, starts
 from urban_processing.site import AREA_ROUNDING
 

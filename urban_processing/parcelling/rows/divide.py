@@ -8,10 +8,11 @@ import numpy as np
 import shapely
 
 from urban_processing.errors import TopologyError
-from urban_processing.hashing import uniform
+from urban_processing.hashing import child, uniform
 from urban_processing.mesh.corners import ring_areas
 from urban_processing.mesh.planar import IntArray
-from urban_processing.parcelling.divided import (
+from urban_processing.parcelling.ground import Ground, Pieces, Rules
+from urban_processing.parcelling.rows.divided import (
     Divided,
     Face,
     Polygon,
@@ -20,17 +21,16 @@ from urban_processing.parcelling.divided import (
     straightened,
     whole,
 )
-from urban_processing.parcelling.ground import Ground, Pieces, Rules
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.mending import Needs, beta_strips
-from urban_processing.parcelling.patios import joined, patio_faces, rows_and_patios
-from urban_processing.parcelling.plots import Plots, edges_of
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.slices import Lot, Slicer, rings_of_lots
-from urban_processing.parcelling.spacing import Bounds
-from urban_processing.parcelling.streets import logical_streets, sides_of_rings
-from urban_processing.parcelling.strips import Strip, alpha_strips
-from urban_processing.parcelling.tidy import divide_large, tidy
+from urban_processing.parcelling.rows.mending import beta_strips
+from urban_processing.parcelling.rows.patios import joined, patio_faces, rows_and_patios
+from urban_processing.parcelling.rows.plots import Plots, edges_of
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.slices import Lot, Slicer, rings_of_lots
+from urban_processing.parcelling.rows.spacing import Bounds
+from urban_processing.parcelling.rows.streets import logical_streets, sides_of_rings
+from urban_processing.parcelling.rows.strips import Strip, alpha_strips
+from urban_processing.parcelling.rows.tidy import divide_large, tidy
+from urban_processing.parcelling.rows.uniting import Needs
 from urban_processing.skeleton.straight import Skeleton, straight_skeleton
 
 LEAST_FRONT = 0.75
@@ -70,6 +70,15 @@ def divide_in_rows(ground: Ground, rules: Rules, *, seed: int) -> Pieces:
     -------
     Pieces
         Parcels, and patios of perimeter blocks.
+
+    Notes
+    -----
+    Where this departs from the paper: the standard deviation of widths is ω/3 of their mean;
+    fronts are shared out so that areas, too, keep their bounds where they can; lines are straight
+    from the street to the rear and fanned beside bends, where the paper's follow arcs of the
+    skeleton; strips at a sharp corner are one row only as far as two would be too shallow; a
+    small parcel goes to the neighbour with which it is compact, not by the border alone.
+    Triangles that are large enough and have their frontage stay.
 
     References
     ----------
@@ -124,7 +133,7 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     except TopologyError:
         return whole(polygon)
     skeleton, patios = rows_and_patios(
-        skeleton, offset=float(rules.offset[k]), area=area, min_area=bounds.min_area
+        skeleton, offset=float(rules.offset[k]), area=area, bounds=bounds
     )
     sheet = Sheet(skeleton.xy, skeleton.height, polygon.following)
     needs = Needs(
@@ -138,7 +147,7 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     )
     strips = _alpha_strips(sheet, polygon, skeleton, corner=float(rules.corner[k]), needs=needs)
     inside = {edge for patio in patios for ring in patio for edge in edges_of(ring)}
-    strips, left = beta_strips(sheet, strips, needs, inside)
+    strips, left = beta_strips(sheet, strips, needs=needs, patio=inside)
     if left:
         patios = joined(sheet, patios, [strip.ring for strip in left])
     parts = [_lots(sheet, polygon, strip, bounds, seed=seed, wary=wary) for strip in strips]
@@ -207,4 +216,4 @@ def _plots(sheet: Sheet, polygon: Polygon, parts: Sequence[tuple[Strip, list[Lot
             polygons += shapes
             own = child(lineage, k)
             seeds += [own] + [child(own, j) for j in range(1, len(shapes))]
-    return Plots(sheet, polygons, seeds, polygon.access)
+    return Plots(sheet, polygons, seeds, access=polygon.access)

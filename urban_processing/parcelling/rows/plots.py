@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.hashing import child
+from urban_processing.parcelling.rows.sheet import Sheet
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,7 @@ class Plots:
         sheet: Sheet,
         polygons: Sequence[list[list[int]]],
         lineage: Sequence[int],
+        *,
         access: Sequence[bool],
     ) -> None:
         self.sheet, self.access = sheet, access
@@ -49,10 +50,10 @@ class Plots:
         self.level: dict[int, int] = {}
         self.left_of: dict[tuple[int, int], int] = {}
         for (ring, *holes), seed in zip(polygons, lineage, strict=True):
-            self._put(ring, seed, 1, holes)
+            self._put(ring, seed, 1, holes=holes)
 
     def _put(
-        self, ring: list[int], lineage: int, level: int, holes: Sequence[list[int]] = ()
+        self, ring: list[int], lineage: int, level: int, *, holes: Sequence[list[int]] = ()
     ) -> None:
         number = len(self.area)
         self.rings[number] = ring
@@ -121,7 +122,8 @@ class Plots:
         self._take(number)
         self._take(other)
         level = max(self.level[number], self.level[other])
-        self._put(ring, self.lineage[other], level, self.holes[number] + self.holes[other])
+        holes = self.holes[number] + self.holes[other]
+        self._put(ring, self.lineage[other], level, holes=holes)
 
     def divide(self, number: int, p: Place, q: Place) -> None:
         """Divide a parcel by the line between two places of its ring."""
@@ -188,11 +190,11 @@ class Plots:
         px, py = x[u] + share * (x[v] - x[u]), y[u] + share * (y[v] - y[u])
         nx, ny = y[u] - y[v], x[v] - x[u]
         size = math.hypot(nx, ny)
-        hit = self._first_hit(ring, edge, (px, py), (nx / size, ny / size))
+        hit = self._first_hit(ring, edge, p=(px, py), d=(nx / size, ny / size))
         return Place(edge, share), hit
 
     def _first_hit(
-        self, ring: Sequence[int], own: int, p: tuple[float, float], d: tuple[float, float]
+        self, ring: Sequence[int], own: int, *, p: tuple[float, float], d: tuple[float, float]
     ) -> Place | None:
         x, y = self.sheet.x, self.sheet.y
         (px, py), (dx, dy) = p, d

@@ -8,10 +8,10 @@ import numpy as np
 
 from urban_processing.access_rule import MEASURED_M, reached_frontage
 from urban_processing.mesh.planar import FloatArray, IntArray
-from urban_processing.parcelling.candidates import Contour, Faces
-from urban_processing.parcelling.line_cuts import TOUCH, Cut
+from urban_processing.parcelling.boxes.candidates import Contour, Faces
+from urban_processing.parcelling.boxes.line_cuts import TOUCH, Cut
+from urban_processing.parcelling.boxes.sweep import Sweep
 from urban_processing.parcelling.rings import Rings
-from urban_processing.parcelling.sweep import Sweep
 from urban_processing.site import AREA_ROUNDING
 
 GOOD, FAIR, BAD = 0, 1, 2

@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from urban_processing.hashing import child
 from urban_processing.mesh.corners import ring_areas
-from urban_processing.parcelling.divided import Face
-from urban_processing.parcelling.lineage import child
-from urban_processing.parcelling.plots import edges_of
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.rows.divided import Face
+from urban_processing.parcelling.rows.plots import edges_of
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.spacing import Bounds
 from urban_processing.skeleton.straight import Skeleton, cut_at_depth
 
 Ring = list[int]
 
 
 def rows_and_patios(
-    skeleton: Skeleton, *, offset: float, area: float, min_area: float
+    skeleton: Skeleton, *, offset: float, area: float, bounds: Bounds
 ) -> tuple[Skeleton, list[list[Ring]]]:
     """Cut the faces of a skeleton off at the depth of rows; return the rings of each patio too.
 
-    Rows meet back to back where no patio would be as large as a parcel, or nothing would be left
-    for one.
+    Rows meet back to back where no patio would be as large as a parcel and as wide, or nothing
+    would be left for one.
     """
-    if not math.isfinite(offset):
+    if skeleton.height.max() - offset < 0.5 * bounds.min_width:
         return skeleton, []
     lower, patios = cut_at_depth(skeleton, offset)
     inner = [
         float(ring_areas(lower.xy[np.concatenate(p)], np.cumsum([0, *map(len, p)])).sum())
         for p in patios
     ]
-    if max(inner, default=0.0) < min_area or area - sum(inner) < min_area:
+    if max(inner, default=0.0) < bounds.min_area or area - sum(inner) < bounds.min_area:
         return skeleton, []
     return lower, [[ring.tolist() for ring in patio] for patio in patios]
 

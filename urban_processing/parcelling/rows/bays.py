@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bisect
 import math
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.strips import Strip
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.strips import Guide, Strip
 
 TINY = 1e-6
 
@@ -46,30 +46,40 @@ class Bay:
         Length of the front up to the run.
     first, last
         Places of its ends in the front.
+    guides
+        Guides of bends of the front that lines are fanned beside.
     """
 
-    def __init__(self, sheet: Sheet, strip: Strip, start: float, *, first: int, last: int) -> None:
+    def __init__(
+        self,
+        sheet: Sheet,
+        strip: Strip,
+        guides: dict[int, Guide],
+        *,
+        start: float,
+        first: int,
+        last: int,
+    ) -> None:
         u, v = strip.front[first], strip.front[last]
         self.start, self.first, self.last = start, first, last
         self.x, self.y = sheet.x[u], sheet.y[u]
         ex, ey = sheet.x[v] - self.x, sheet.y[v] - self.y
         self.length = math.hypot(ex, ey)
         self.dx, self.dy = ex / self.length, ey / self.length
-        right, left = strip.guides.get(v), strip.guides.get(u)
-        n = len(strip.back) - 1
-        begin = right if right is not None and last < len(strip.front) - 1 else None
-        end = left if left is not None and first > 0 else None
-        self._window(sheet, strip, begin, end, n)
+        begin = guides.get(v) if last < len(strip.front) - 1 else None
+        end = guides.get(u) if first > 0 else None
+        self._window(sheet, strip, begin=begin, end=end)
         self._knots(begin is not None, end is not None)
 
     def _window(
         self,
         sheet: Sheet,
         strip: Strip,
-        begin: tuple[float, float, float] | None,
-        end: tuple[float, float, float] | None,
-        n: int,
+        *,
+        begin: Guide | None,
+        end: Guide | None,
     ) -> None:
+        n = len(strip.back) - 1
         low = begin[0] if begin is not None else 0.0
         high = max(end[0] if end is not None else float(n), low)
         spots = [] if begin is None else [begin]
@@ -160,32 +170,39 @@ class Bay:
         return Hit(at, self.x + t * self.dx - h * self.dy, self.y + t * self.dy + h * self.dx)
 
 
-def bays_of(sheet: Sheet, strip: Strip) -> list[Bay]:
-    """Divide the front of a strip where it bends."""
-    ends = [k for k, v in enumerate(strip.front) if k and v in strip.corners]
-    if not ends or ends[-1] != len(strip.front) - 1:
-        ends.append(len(strip.front) - 1)
-    _settle(strip)
+def bays_of(sheet: Sheet, strip: Strip, *, reach: float) -> list[Bay]:
+    """Divide the front of a strip where it bends.
+
+    Bends within ``reach`` of its ends are taken for parts of a rounded corner, where no lines
+    are fanned: those of the straight run beside it stay at right angles.
+    """
+    front = strip.front
+    ends = [k for k, v in enumerate(front) if k and v in strip.corners]
+    if not ends or ends[-1] != len(front) - 1:
+        ends.append(len(front) - 1)
+    guides = _guides(sheet, strip, reach if front[0] != front[-1] else 0.0)
     bays = []
     first, start = 0, 0.0
     for last in ends:
-        bay = Bay(sheet, strip, start, first=first, last=last)
+        bay = Bay(sheet, strip, guides, start=start, first=first, last=last)
         bays.append(bay)
         first, start = last, start + bay.length
     return bays
 
 
-def _settle(strip: Strip) -> None:
-    """See to it that guides do not cross: their ends run back along the back."""
+def _guides(sheet: Sheet, strip: Strip, reach: float) -> dict[int, Guide]:
+    """Guides away from the ends; one that is lacking, or crosses others, is the one before it."""
+    front = strip.front
+    along = [0.0, *accumulate(sheet.distance(u, v) for u, v in pairwise(front))]
     limit, mark = float(len(strip.back) - 1), None
-    for vertex in strip.front[1:-1]:
-        if vertex not in strip.corners:
+    guides = {}
+    for k in range(1, len(front) - 1):
+        vertex = front[k]
+        if vertex not in strip.corners or min(along[k], along[-1] - along[k]) < reach:
             continue
         guide = strip.guides.get(vertex)
-        if guide is None or guide[0] > limit:
-            if mark is not None:
-                strip.guides[vertex] = mark
-            else:
-                strip.guides.pop(vertex, None)
-            continue
-        limit, mark = guide[0], guide
+        if guide is not None and guide[0] <= limit:
+            limit, mark = guide[0], guide
+        if mark is not None:
+            guides[vertex] = mark
+    return guides

@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from urban_processing.parcelling.sheet import Sheet
-from urban_processing.parcelling.streets import Street
+from urban_processing.parcelling.rows.sheet import Sheet
+from urban_processing.parcelling.rows.streets import Side, Street
 
 RIDGE = math.cos(math.radians(100.0))
 """Cosine of the angle from which two sides of one street have their backs to each other."""
+
+
+Edge = tuple[int, int]
+Guide = tuple[float, float, float]
 
 
 @dataclass
@@ -34,7 +38,7 @@ class Strip:
 
     front: list[int]
     back: list[int]
-    guides: dict[int, tuple[float, float, float]]
+    guides: dict[int, Guide]
     street: Street
     rank: int = 0
     corners: dict[int, tuple[float, float]] = field(default_factory=dict)
@@ -45,8 +49,9 @@ class Strip:
         """Vertices of the whole ring."""
         return self.front[:-1] + self.back[:-1]
 
-    def splice(self, sheet: Sheet, start: int, stop: int, between: Sequence[int]) -> None:
+    def splice(self, sheet: Sheet, ends: tuple[int, int], between: Sequence[int]) -> None:
         """Put other vertices between two of the back; guides that ended there end anew."""
+        start, stop = ends
         self.back[start + 1 : stop] = between
         shift = len(between) - (stop - start - 1)
         for vertex, (at, x, y) in self.guides.items():
@@ -56,7 +61,7 @@ class Strip:
                 section = range(start, start + len(between) + 1)
                 self.guides[vertex] = self._prolonged(sheet, vertex, section)
 
-    def _prolonged(self, sheet: Sheet, vertex: int, section: range) -> tuple[float, float, float]:
+    def _prolonged(self, sheet: Sheet, vertex: int, section: range) -> Guide:
         """Where the guide of a vertex meets a section of the back, led on as it was."""
         _, gx, gy = self.guides[vertex]
         dx, dy = self.corners[vertex]
@@ -91,8 +96,8 @@ class FaceMap:
     """
 
     def __init__(self, faces: Sequence[Sequence[int]]) -> None:
-        self.face: dict[tuple[int, int], int] = {}
-        self.following: dict[tuple[int, int], int] = {}
+        self.face: dict[Edge, int] = {}
+        self.following: dict[Edge, int] = {}
         self.neighbours: dict[int, list[int]] = {}
         for number, ring in enumerate(faces):
             u, v = ring[-2], ring[-1]
@@ -110,36 +115,37 @@ def alpha_strips(
     mesh = FaceMap(faces)
     street_of = {side.face: k for k, street in enumerate(streets) for side in street.sides}
     sides = {side.face: side for street in streets for side in street.sides}
-    glued = _glued(mesh, street_of, {f: (s.dx, s.dy) for f, s in sides.items()}, streets)
+    glued = _glued(mesh, streets, street_of=street_of, sides=sides)
     strips = []
     for number, street in enumerate(streets):
         if street.closed:
-            _open(sheet, mesh, glued, street.front[0])
+            _open(sheet, mesh, street.front[0], glued=glued)
         own = {edge for edge, face in mesh.face.items() if street_of[face] == number}
-        strips.append(_strip(sheet, mesh, glued, street, own))
+        strips.append(_strip(sheet, street, own, mesh=mesh, glued=glued))
     return strips
 
 
 def _glued(
     mesh: FaceMap,
-    street_of: dict[int, int],
-    direction: dict[int, tuple[float, float]],
     streets: Sequence[Street],
-) -> set[tuple[int, int]]:
+    *,
+    street_of: dict[int, int],
+    sides: dict[int, Side],
+) -> set[Edge]:
     """Directed arcs within a strip: those that are not between sides back to back."""
-    bends = {v for s in streets for side in s.sides[1:] for v in side.run[:1]}
+    bends = {side.run[0] for street in streets for side in street.sides[1:]}
     glued = set()
     for (u, v), face in mesh.face.items():
         other = mesh.face.get((v, u))
         if other is None or other == face or street_of[face] != street_of[other]:
             continue
-        (ax, ay), (bx, by) = direction[face], direction[other]
-        if ax * bx + ay * by > RIDGE or u in bends or v in bends:
+        a, b = sides[face], sides[other]
+        if a.dx * b.dx + a.dy * b.dy > RIDGE or u in bends or v in bends:
             glued.add((u, v))
     return glued
 
 
-def _open(sheet: Sheet, mesh: FaceMap, glued: set[tuple[int, int]], start: int) -> None:
+def _open(sheet: Sheet, mesh: FaceMap, start: int, *, glued: set[Edge]) -> None:
     """Cut a closed street open along the arcs from a vertex of the contour up to its back."""
     u = start
     while True:
@@ -155,18 +161,14 @@ def _open(sheet: Sheet, mesh: FaceMap, glued: set[tuple[int, int]], start: int) 
 
 
 def _strip(
-    sheet: Sheet,
-    mesh: FaceMap,
-    glued: set[tuple[int, int]],
-    street: Street,
-    own: set[tuple[int, int]],
+    sheet: Sheet, street: Street, own: set[Edge], *, mesh: FaceMap, glued: set[Edge]
 ) -> Strip:
     """Walk around the faces of a street and find where its guides end."""
     rim = {edge for edge in own if edge not in glued}
     while True:
         walk, passed = _walk(mesh, glued, street.front[:2])
         left = rim - set(pairwise(walk))
-        way = _way(sheet, mesh, glued & own, left, set(walk[len(street.front) - 1 :]))
+        way = _way(sheet, mesh, glued & own, left=left, goal=set(walk[len(street.front) - 1 :]))
         if not way:
             break
         glued -= way
@@ -175,7 +177,7 @@ def _strip(
     strip = Strip(street.front, walk[n - 1 :], {}, street)
     for before, side in pairwise(street.sides):
         vertex = side.run[0]
-        end = _guide_end(sheet, mesh, passed, vertex)
+        end = _guide_end(sheet, mesh, vertex, passed=passed)
         x, y = before.dx + side.dx, before.dy + side.dy
         size = math.hypot(x, y)
         strip.corners[vertex] = (-y / size, x / size)
@@ -186,13 +188,13 @@ def _strip(
 
 
 def _walk(
-    mesh: FaceMap, glued: set[tuple[int, int]], start: Sequence[int]
-) -> tuple[list[int], dict[tuple[int, int], int]]:
+    mesh: FaceMap, glued: set[Edge], start: Sequence[int]
+) -> tuple[list[int], dict[Edge, int]]:
     """Walk once around; also return where arcs within are passed, by their directed edge."""
     first = (start[0], start[1])
     u, v = first
     walk = [u]
-    passed: dict[tuple[int, int], int] = {}
+    passed: dict[Edge, int] = {}
     while True:
         walk.append(v)
         w = mesh.following[u, v]
@@ -205,7 +207,7 @@ def _walk(
 
 
 def _guide_end(
-    sheet: Sheet, mesh: FaceMap, passed: dict[tuple[int, int], int], vertex: int
+    sheet: Sheet, mesh: FaceMap, vertex: int, *, passed: dict[Edge, int]
 ) -> tuple[int, int] | None:
     """Follow the arcs from a bend of the front up to the back."""
     u = vertex
@@ -222,10 +224,11 @@ def _guide_end(
 def _way(
     sheet: Sheet,
     mesh: FaceMap,
-    arcs: set[tuple[int, int]],
-    left: set[tuple[int, int]],
+    arcs: set[Edge],
+    *,
+    left: set[Edge],
     goal: set[int],
-) -> set[tuple[int, int]]:
+) -> set[Edge]:
     """Shortest way of arcs, in both directions, from a part of the rim not walked to the walk."""
     reached = {u: (0.0, -1) for edge in left for u in edge if u not in goal}
     todo = sorted(reached)

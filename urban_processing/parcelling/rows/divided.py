@@ -10,7 +10,7 @@ import numpy as np
 
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.parcelling.ground import Ground, Pieces
-from urban_processing.parcelling.sheet import Sheet
+from urban_processing.parcelling.rows.sheet import Sheet
 
 STRAIGHT = 1e-7
 """Distance in metres within which a vertex that was added is on a straight line."""
