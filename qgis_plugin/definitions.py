@@ -22,7 +22,7 @@ from qgis.core import (
 )
 
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind, Output, OutputKind
-from urban_processing.algorithms.words import limits_in_words
+from urban_processing.algorithms.words import column_in_words, limits_in_words
 from urban_processing.params import ParamField
 from urban_processing.schema import GeometryType, Layer
 
@@ -198,8 +198,8 @@ def _parameter(field: ParamField) -> QgsProcessingParameterDefinition:
         definition = QgsProcessingParameterString(name, label, field.default, **shared)
     else:
         definition = _number(field, name, label)
-    limits = limits_in_words(field)
-    return _helped(definition, f"{param.help} ({limits})" if limits else param.help)
+    words = "; ".join(filter(None, (limits_in_words(field), column_in_words(field))))
+    return _helped(definition, f"{param.help} ({words})" if words else param.help)
 
 
 def _number(field: ParamField, name: str, label: str) -> QgsProcessingParameterNumber:

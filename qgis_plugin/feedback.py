@@ -33,12 +33,14 @@ def stop_if_cancelled(feedback: QgsProcessingFeedback) -> None:
 
 
 def in_qgis(sentence: str) -> str:
-    """Return a sentence without the options of the command line.
+    """Return a sentence without the options of the command line, and with the words of QGIS.
 
     >>> in_qgis("Give it with crs (--crs EPSG:code), or assign it.")
     'Give it with crs, or assign it.'
+    >>> in_qgis("It must be a number, or an empty cell (None).")
+    'It must be a number, or an empty cell (NULL).'
     """
-    return _OPTION.sub("", sentence)
+    return _OPTION.sub("", sentence).replace("cell (None)", "cell (NULL)")
 
 
 @contextmanager

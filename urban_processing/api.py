@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
@@ -37,6 +37,9 @@ from urban_processing.processes import process_pool
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.schema import BLOCK_EDGES, BLOCKS
 from urban_processing.site import Site
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 
 def cogenerate(
@@ -275,9 +278,9 @@ def subdivide(
     if isinstance(blocks, GeoLayers):
         if streets is None and BLOCK_EDGES.name in blocks.made.names:
             streets = blocks.frame(BLOCK_EDGES.name)
-        blocks = blocks.frame(BLOCKS.name)
+        blocks = _without_nan(blocks.frame(BLOCKS.name))
     usable = not SubdivideParams.problems_with(parameters)
-    params, ground, before = _gathered(
+    params, ground, before, processes = _gathered(
         lambda: SubdivideParams.from_values(parameters),
         lambda: read_blocks(
             blocks,
@@ -288,6 +291,7 @@ def subdivide(
             params=SubdivideParams.from_values(parameters) if usable else None,
         ),
         lambda: _previous(previous),
+        lambda: _number_of_processes(processes),
     )
     if processes == 1:
         made = subdivision.subdivide(ground, params, progress, previous=before)
@@ -313,10 +317,28 @@ def _gathered(*steps: Callable[[], Any]) -> list[Any]:
     return found
 
 
+def _number_of_processes(given: int) -> int:
+    if given < 1:
+        raise ParameterError(f"processes must be at least 1; got {given}.")
+    return given
+
+
 def _previous(given: GeoLayers | str | PathLike[str] | None) -> Previous | None:
     if given is None:
         return None
-    return previous_of(given.made) if isinstance(given, GeoLayers) else read_subdivision(given)
+    if isinstance(given, GeoLayers):
+        return previous_of(given.made)
+    if not isinstance(given, str | PathLike):
+        raise BoundaryError(
+            f"{type(given).__name__} is no subdivision: give what subdivide made, or its file."
+        )
+    return read_subdivision(given)
+
+
+def _without_nan(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """A frame of our own layers, in which NaN stands for an empty cell, with None there."""
+    attributes = frame.drop(columns=frame.geometry.name).astype(object)
+    return frame.assign(**attributes.where(attributes.notna(), None))
 
 
 def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
@@ -404,6 +426,10 @@ def _layout(
         return layout.layout
     if isinstance(layout, Layout):
         return layout
+    if not isinstance(layout, str | PathLike):
+        raise BoundaryError(
+            f"{type(layout).__name__} is no layout: give what cogenerate made, or its file."
+        )
     return read_layout(layout, snap=params.snap).layout
 
 

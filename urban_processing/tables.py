@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -70,6 +71,12 @@ def issue_table(issues: Sequence[Issue], frame: Frame) -> Table:
         },
         to_map([i.geometry for i in issues], frame),
     )
+
+
+def issues_in_words(issues: Sequence[Issue]) -> str:
+    """Return how many issues there are of each kind: ``2 parcel_large, 1 parcel_wide``."""
+    counts = Counter(issue.code for issue in issues)
+    return ", ".join(f"{n:,} {code}" for code, n in sorted(counts.items()))
 
 
 def provenance_table(steps: Sequence[Step]) -> Table:

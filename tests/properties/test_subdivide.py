@@ -230,7 +230,9 @@ def test_what_was_set_for_a_block_holds_for_both_of_its_parts(town: Blocks, tmp_
 
 def test_another_crs_is_told(town: Blocks, tmp_path: Path) -> None:
     previous = kept(subdivide(town, PARAMS), tmp_path)
-    with pytest.raises(BoundaryError, match="different CRSs"):
+    with pytest.raises(
+        BoundaryError, match="before is in no CRS, but the blocks are worked on in EPSG:32630"
+    ):
         subdivide(dataclasses.replace(town, frame=Frame("EPSG:32630")), PARAMS, previous=previous)
 
 

@@ -24,6 +24,7 @@ from urban_processing.algorithms import (
 from urban_processing.algorithms.json_schema import description, parameters_schema
 from urban_processing.algorithms.reference import algorithm_page, layout_file_page
 from urban_processing.algorithms.words import (
+    column_in_words,
     default_in_words,
     kind_in_words,
     limits_in_words,
@@ -101,7 +102,10 @@ def test_shells_show_the_same_names_defaults_and_limits(spec: AlgorithmSpec) -> 
         assert limits_in_words(field) in option.note
         assert default_in_words(field) in option.note
         assert option.default is None  # one place for defaults: the parameter class
-        assert f"`{field.name}` | {kind_in_words(field)} | {limits_in_words(field)}" in page
+        assert column_in_words(field) in option.note
+        assert shown.get("x-per-feature", False) is field.param.per_feature
+        kind = ", ".join(filter(None, (kind_in_words(field), column_in_words(field))))
+        assert f"`{field.name}` | {kind} | {limits_in_words(field)}" in page
 
 
 def test_limits_are_said_in_words() -> None:
@@ -180,6 +184,23 @@ def test_reference_pages_are_up_to_date(spec: AlgorithmSpec) -> None:
     hint = "run python docs/build.py"
     assert (DOCS / f"{spec.name}.md").read_text(encoding="utf-8") == algorithm_page(spec), hint
     assert (DOCS / "layout_file.md").read_text(encoding="utf-8") == layout_file_page(), hint
+
+
+@pytest.mark.parametrize("spec", specs(), ids=lambda spec: spec.name)
+def test_pages_list_the_columns_of_what_is_no_layout(spec: AlgorithmSpec) -> None:
+    page = algorithm_page(spec)
+    for output in spec.outputs:
+        if output.kind is OutputKind.LAYOUT:
+            assert "[layout_file.md](layout_file.md)" in page
+            assert "### `" not in page
+        for layer in output.layers if output.kind is OutputKind.LAYERS else ():
+            _, found, after = page.partition(f"### `{layer.name}`\n")
+            assert found
+            table = after.partition("\n#")[0]
+            assert ("Columns of the input follow" in table) is layer.open
+            rows = [line.split(" | ")[0] for line in table.splitlines() if line.startswith("| `")]
+            assert rows == [f"| `{column.name}`" for column in layer.columns]
+            assert all(column.description in table for column in layer.columns)
 
 
 def test_the_layout_file_page_has_every_layer_column_and_metric() -> None:

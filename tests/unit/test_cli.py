@@ -109,6 +109,8 @@ def test_help_shows_every_parameter_with_unit_limits_and_default(spec: Algorithm
             note += ["defaultyes" if shown["default"] else "defaultno"]
         elif shown["default"] is not None:
             note += [f"default{shown['default']}".removesuffix(".0")]
+        if "x-per-feature" in shown:
+            note += ["oracolumn"]
         assert f"[{';'.join(note)}]" in text if note else True
 
 

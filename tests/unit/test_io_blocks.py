@@ -288,7 +288,7 @@ def test_columns_set_parameters_block_by_block() -> None:
     [
         ("min_area", [300, math.nan], "finite number, or an empty cell (None): nan in row 2"),
         ("min_area", [-5, 300], "above 0 m²: -5 in row 1"),
-        ("min_area", ["many", 300], "a number: many in row 1"),
+        ("min_area", ["many", 300], "a number: 'many' in row 1"),
         ("min_area", [True, 300], "a number: True in row 1"),
         ("max_area", [math.inf, 900], "finite number"),
         ("irregularity", [0.5, 1.5], "at most 1: 1.5 in row 2"),

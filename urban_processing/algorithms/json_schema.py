@@ -16,7 +16,7 @@ def parameters_schema(params: type[Params]) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a parameter class.
 
     Units, groups and readable labels, which the standard has no words for, stand under keys
-    that begin with ``x-``.
+    that begin with ``x-``; ``x-per-feature`` marks what a column of the main input may set.
 
     Examples
     --------
@@ -85,5 +85,6 @@ def _property(field: ParamField) -> dict[str, Any]:
         "x-group": param.group or None,
         "x-advanced": param.advanced or None,
         "x-labels": dict(param.labels) or None,
+        "x-per-feature": param.per_feature or None,
     }
     return out | {key: value for key, value in limits.items() if value is not None}

@@ -46,6 +46,11 @@ def default_in_words(field: ParamField) -> str:
     return f"{default:g}" if isinstance(default, float) else str(default)
 
 
+def column_in_words(field: ParamField) -> str:
+    """Return ``or a column`` for a parameter that a column may set feature by feature."""
+    return "or a column" if field.param.per_feature else ""
+
+
 def estimate_in_words(estimate: Estimate) -> str:
     """Return what a run will make and take: ``about 1,200 parcels, about 2.2 s``."""
     return f"about {estimate.parcels:,} parcels, about {duration_in_words(estimate.seconds)}"

@@ -6,7 +6,12 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from urban_processing.algorithms.spec import AlgorithmSpec
-from urban_processing.algorithms.words import default_in_words, kind_in_words, limits_in_words
+from urban_processing.algorithms.words import (
+    column_in_words,
+    default_in_words,
+    kind_in_words,
+    limits_in_words,
+)
 from urban_processing.cli import help as help_pages
 from urban_processing.cli.terminal import plain_table
 from urban_processing.params.base import ParamField
@@ -35,5 +40,10 @@ def description_page(spec: AlgorithmSpec) -> str:
 
 def _values(field: ParamField) -> str:
     default = default_in_words(field)
-    words = (kind_in_words(field), limits_in_words(field), default and f"default {default}")
+    words = (
+        kind_in_words(field),
+        limits_in_words(field),
+        default and f"default {default}",
+        column_in_words(field),
+    )
     return ", ".join(word for word in words if word)

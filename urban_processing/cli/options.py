@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
-from urban_processing.algorithms.words import default_in_words, limits_in_words
+from urban_processing.algorithms.words import column_in_words, default_in_words, limits_in_words
 from urban_processing.params.base import ParamField, option_name
 
 INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
@@ -63,6 +63,8 @@ def parameter_option(field: ParamField, panel: str) -> PanelOption:
     notes = [limits_in_words(field)]
     if default_in_words(field):
         notes.append(f"default {default_in_words(field)}")
+    if column_in_words(field):
+        notes.append(column_in_words(field))
     complete: Completion | None = None
     metavar: str | None = None
     if field.kind is bool:

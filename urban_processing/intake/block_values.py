@@ -129,10 +129,15 @@ def _numbers(
         else:
             out[row] = number
     problems += [
-        f"Column {field.name} must be {reason}: {values[bad[0]]!s} in {called(bad)}."
+        f"Column {field.name} must be {reason}: {_shown(values[bad[0]])} in {called(bad)}."
         for reason, bad in wrong.items()
     ]
     return out
+
+
+def _shown(value: Any) -> str:
+    """A value as a reader sees it in the table; text in quotes."""
+    return repr(value) if isinstance(value, str) else str(value)
 
 
 def _number(value: Any) -> str:

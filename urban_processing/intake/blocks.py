@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -32,6 +32,7 @@ from urban_processing.intake.street_lines import (
 from urban_processing.intake.working import source_crs, working_crs
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.planar import IntArray
+from urban_processing.params.base import option_name
 from urban_processing.params.blocks import BlocksParams
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.site import GRID, Frame, Issue
@@ -41,6 +42,14 @@ ObjectArray = npt.NDArray[np.object_]
 
 HAIR = 0.01
 """Overlaps of blocks that are nowhere wider than this, in metres, come from rounding."""
+
+_TOO_LARGE = 2**62
+"""Numbers of blocks stay below, so that new ones fit above them."""
+
+_NEED = (
+    "Blocks must be polygons: the algorithm blocks finds those between lines of streets; closed "
+    "lines can be turned into polygons first (in QGIS: Lines to Polygons)."
+)
 
 MINIMUM_AREA = 1e-3
 """Pieces below this many m² are what projecting and rounding leave, no blocks."""
@@ -103,6 +112,7 @@ def build_blocks(
     if found:
         raise BoundaryError(found)
     issues += [Issue(note.code, note.message, value=note.value) for note in cleaned.notes]
+    issues += _unused(columns, rows, params or SubdivideParams())
     target = working_crs(
         shapely.get_coordinates(cleaned.valid),
         own,
@@ -133,10 +143,29 @@ def build_blocks(
 
 def _cleaned(features: Features[Any], problems: list[str]) -> CleanedEach | None:
     try:
-        return clean_each(features)
+        return clean_each(features, need=_NEED)
     except BoundaryError as error:
         problems += error.problems
         return None
+
+
+def _unused(
+    columns: Mapping[str, ObjectArray], rows: IntArray, params: SubdivideParams
+) -> list[Issue]:
+    """One issue for each parameter that was given, but that a column sets for every block."""
+    issues = []
+    for field in params.fields():
+        given = getattr(params, field.name)
+        if field.name not in columns or given == field.default:
+            continue
+        values = columns[field.name][rows].tolist()
+        if None not in values and set(values) != {given}:
+            message = (
+                f"{option_name(field.name)} ({given}) has no effect: the column {field.name} sets "
+                "it for every block."
+            )
+            issues.append(Issue("parameter_unused", message, value=float(len(values))))
+    return issues
 
 
 def _block_ids(features: Features[Any], rows: IntArray) -> tuple[IntArray | None, list[str]]:
@@ -148,7 +177,8 @@ def _block_ids(features: Features[Any], rows: IntArray) -> tuple[IntArray | None
     bad = []
     for row in rows.tolist():
         value = values[row]
-        if isinstance(value, int | float | np.number) and value == math.floor(value):
+        whole = isinstance(value, int | float | np.number) and float(value).is_integer()
+        if whole and abs(value) < _TOO_LARGE:
             out[row] = int(value)
         else:
             bad.append(row)

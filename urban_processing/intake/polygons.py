@@ -17,6 +17,12 @@ REPAIR_TOLERANCE = 0.05
 """An invalid polygon is repaired while that changes its area by no more than this share;
 beyond, as with a bow-tie, which side is land is not clear."""
 
+LAND_NEEDED = (
+    "A boundary must be a polygon; closed lines can be turned into polygons first (in QGIS: "
+    "Lines to Polygons)."
+)
+"""What is needed where land is asked for."""
+
 _MAX_NAMED = 5
 
 ObjectArray = npt.NDArray[np.object_]
@@ -93,8 +99,15 @@ class CleanedEach:
     notes: tuple[Note, ...]
 
 
-def clean_each(features: Features[Any]) -> CleanedEach:
+def clean_each(features: Features[Any], *, need: str = LAND_NEEDED) -> CleanedEach:
     """Return the polygons of some features, each of them made valid.
+
+    Parameters
+    ----------
+    features
+        The features.
+    need
+        What is said where none is a polygon: what is needed, and how to come by it.
 
     Raises
     ------
@@ -102,7 +115,7 @@ def clean_each(features: Features[Any]) -> CleanedEach:
         As `clean_polygons`, but for an area that is missing.
     """
     report = _Report()
-    polygons, feature = _polygons_of(features, report)
+    polygons, feature = _polygons_of(features, need, report)
     if not report.problems:
         _check_finite(polygons, feature, report)
     if report.problems:
@@ -114,7 +127,7 @@ def clean_each(features: Features[Any]) -> CleanedEach:
 
 
 def _polygons_of(
-    features: Features[Any], report: _Report
+    features: Features[Any], need: str, report: _Report
 ) -> tuple[ObjectArray, npt.NDArray[np.int64]]:
     """Single polygons without heights, and the row of the feature each comes from."""
     geometry = features.geometry
@@ -131,10 +144,7 @@ def _polygons_of(
     pieces, index = _flat_parts(geometry[rows])
     is_polygon = shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON
     if not is_polygon.any():
-        report.problems.append(
-            f"{name} holds {_counted(pieces)}, but no polygon. A boundary must be a polygon; "
-            "closed lines can be turned into polygons first (in QGIS: Lines to Polygons)."
-        )
+        report.problems.append(f"{name} holds {_counted(pieces)}, but no polygon. {need}")
         return no_polygons
     if blank.any():
         message = f"{int(blank.sum())} feature(s) without geometry were left out."

@@ -129,8 +129,8 @@ def _as_geometries(source: Any) -> npt.NDArray[np.object_]:
         out = np.array([source], dtype=object)
     if not all(g is None or isinstance(g, shapely.Geometry) for g in out):
         raise BoundaryError(
-            f"A boundary cannot be read from {type(source).__name__}: give a path, a "
-            "GeoDataFrame, a GeoSeries or shapely polygons."
+            f"{type(source).__name__} is nothing that can be read: give a path, a GeoDataFrame, a "
+            "GeoSeries or shapely geometries."
         )
     return out
 

@@ -18,6 +18,7 @@ from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
 from urban_processing.layout import NOT_FIXED, GivenStreet, Layout
 from urban_processing.layout_file.geopackage import (
+    LAYERS_STATE,
     LAYOUT_STATE,
     LayerLibrary,
     read_state,
@@ -238,6 +239,12 @@ class _File:
         return shapely.transform(geometry, lambda xy: xy - np.asarray(self.frame.origin))
 
 
+def _what_else(path: Path) -> str:
+    """What a file of ours holds that is no layout, to be said after what it is not."""
+    text = read_state(path, LAYERS_STATE)
+    return "" if text is None else f" but one of another kind ({json.loads(text)['kind']})"
+
+
 def _state(layout: Layout) -> str:
     """Return what the layers do not say about a layout, as JSON."""
     return json.dumps(
@@ -265,7 +272,8 @@ def _read_state(path: Path) -> dict[str, Any]:
     text = read_state(path, LAYOUT_STATE)
     if text is None:
         raise BoundaryError(
-            f"{path} is not a layout file: give a GeoPackage that cogenerate wrote."
+            f"{path} is not a layout file{_what_else(path)}: give a GeoPackage that cogenerate "
+            "wrote."
         )
     state: dict[str, Any] = json.loads(text)
     if state["format"] > FILE_FORMAT:

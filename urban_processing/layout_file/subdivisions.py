@@ -14,7 +14,12 @@ import shapely
 
 from urban_processing.blocks.model import plain_blocks
 from urban_processing.errors import BoundaryError, UrbanError
-from urban_processing.layout_file.geopackage import LAYERS_STATE, LayerLibrary, read_state
+from urban_processing.layout_file.geopackage import (
+    LAYERS_STATE,
+    LAYOUT_STATE,
+    LayerLibrary,
+    read_state,
+)
 from urban_processing.layout_file.writing import FILE_FORMAT
 from urban_processing.metrics.subdivisions import PATIO_USE, SUBDIVISION_KIND
 from urban_processing.params.subdivide import SubdivideParams
@@ -59,13 +64,23 @@ def _frame(path: Path) -> Frame:
     text = read_state(path, LAYERS_STATE)
     state: dict[str, Any] = {} if text is None else json.loads(text)
     if state.get("kind") != SUBDIVISION_KIND:
-        raise BoundaryError(f"{path} holds no subdivision: give a GeoPackage that subdivide wrote.")
+        raise BoundaryError(
+            f"{path} holds no subdivision{_what_else(path, state)}: give a GeoPackage that "
+            "subdivide wrote."
+        )
     if state["format"] > FILE_FORMAT:
         raise BoundaryError(
             f"{path} was written by a newer version of this software: update to read it."
         )
     x, y = state["origin"]
     return Frame(state["crs"], (float(x), float(y)))
+
+
+def _what_else(path: Path, state: Mapping[str, Any]) -> str:
+    """What a file of ours holds instead, to be said after what it does not."""
+    if read_state(path, LAYOUT_STATE) is not None:
+        return " but a layout"
+    return f" but {state['kind']}" if state else ""
 
 
 def previous_of(made: LayerSet) -> Previous:

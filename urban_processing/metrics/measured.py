@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +11,7 @@ import numpy as np
 from urban_processing.layout import Layout
 from urban_processing.metrics.certificate import Certificate, certificate
 from urban_processing.metrics.tables import layout_tables
-from urban_processing.tables import Table
+from urban_processing.tables import Table, issues_in_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +58,8 @@ class MeasuredLayout:
         gained = self.layout.history[-1].results if self.layout.history else {}
         if gained:
             rows.append(("energies", _gains(gained)))
-        codes = Counter(issue.code for issue in self.layout.issues)
-        if codes:
-            counted = ", ".join(f"{n} {code}" for code, n in sorted(codes.items()))
+        if self.layout.issues:
+            counted = issues_in_words(self.layout.issues)
             rows.append(("issues", f"{counted} (see the layer issues)"))
         return rows
 

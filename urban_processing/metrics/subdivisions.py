@@ -6,6 +6,7 @@ from collections import Counter
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import ragged_rows
@@ -17,13 +18,28 @@ from urban_processing.parcelling.rules import rule_values
 from urban_processing.parcelling.subdivision import Subdivision
 from urban_processing.persistence.layers import CHANGES
 from urban_processing.schema import ISSUES
-from urban_processing.tables import LayerSet, Table, issue_table, make_table, to_map
+from urban_processing.tables import (
+    LayerSet,
+    Table,
+    issue_table,
+    issues_in_words,
+    make_table,
+    to_map,
+)
 
 SUBDIVISION_KIND = "subdivision"
 """What files say that they hold."""
 
 PATIO_USE = "patio"
 """Land use of the inside of a perimeter block."""
+
+
+def box_sides(polygons: npt.NDArray[np.object_]) -> FloatArray:
+    """Return the (n, 2) shorter and longer sides of the smallest rotated rectangles around."""
+    boxes = shapely.minimum_rotated_rectangle(polygons)
+    corners = shapely.get_coordinates(boxes).reshape(-1, 5, 2)[:, :3]
+    sides = np.hypot(*np.moveaxis(np.diff(corners, axis=1), 2, 0))
+    return np.asarray(np.sort(sides, axis=1))
 
 
 class MeasuredSubdivision:
@@ -53,10 +69,7 @@ class MeasuredSubdivision:
     @cached_property
     def boxes(self) -> FloatArray:
         """(F, 2) shorter and longer side of the smallest rotated rectangle around each parcel."""
-        boxes = shapely.minimum_rotated_rectangle(self.made.polygons)
-        corners = shapely.get_coordinates(boxes).reshape(-1, 5, 2)[:, :3]
-        sides = np.hypot(*np.moveaxis(np.diff(corners, axis=1), 2, 0))
-        return np.asarray(np.sort(sides, axis=1))
+        return box_sides(self.made.polygons)
 
     @property
     def _shells(self) -> IntArray:
@@ -159,4 +172,6 @@ class MeasuredSubdivision:
             rows.append(("changes", ", ".join(f"{n:,} {name}" for name, n in count.items())))
         if pieces.patio.any():
             rows.append(("patios", f"{int(pieces.patio.sum()):,}"))
+        if self.made.issues:
+            rows.append(("issues", f"{issues_in_words(self.made.issues)} (see the layer issues)"))
         return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 
 from urban_processing.params.base import ParamField
@@ -19,19 +20,36 @@ from urban_processing.schema import (
     Layer,
 )
 
+_MEANINGS = {
+    "part": "Place of the block in the layer of blocks, counted from 0.",
+    "level": "Number of cuts that made the parcel out of its block.",
+    "area_m2": "Area.",
+    "net_area_m2": "The same, as blocks are net of rights-of-way.",
+    "frontage_m": "Length of the boundary on street sides of the block.",
+    "rim": "Whether an edge lies on the contour of the block.",
+    "land_use": "Use of the parcel: parcel, or patio for the open inside of a block.",
+    "locked": "Whether the parcel is not to be cut; never.",
+}
+"""What columns of parcels mean where these lie in blocks that are net of rights-of-way."""
+
+
+def _of_blocks(column: Column) -> Column:
+    meaning = _MEANINGS.get(column.name, column.description)
+    return dataclasses.replace(column, description=meaning)
+
+
 SUBDIVIDED_PARCELS = Layer(
     PARCELS.name,
     GeometryType.POLYGON,
     (
-        *PARCELS.columns,
+        *(_of_blocks(column) for column in PARCELS.columns),
         BLOCK_ID,
         Column("strategy", ColumnType.TEXT, "", "Strategy that made the parcel.", "Strategy"),
     ),
     PARCELS.title,
     shown=True,
 )
-"""Parcels in blocks that are net of rights-of-way: gross and net area are the same, the rim of
-the land is that of the blocks, and `part` is the place of the block in the layer of blocks."""
+"""Parcels, with the columns that those of a layout have."""
 
 
 def _parameter_column(field: ParamField) -> Column:
@@ -45,7 +63,7 @@ SUBDIVIDED_BLOCKS = Layer(
     GeometryType.POLYGON,
     (
         BLOCK_ID,
-        PART,
+        _of_blocks(PART),
         TRUE_AREA,
         Column("parcels", ColumnType.INTEGER, "", "Number of its parcels.", "Parcels"),
         Column(

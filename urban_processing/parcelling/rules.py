@@ -92,8 +92,10 @@ def resolve_rules(
     side = np.sqrt(least)
     max_area = _or(values["max_area"], MAX_OVER_MIN * least)
     # a bound that was given alone moves the default of the other one along
-    max_width = _or(values["max_width"], WIDTH_SHARES[1] * side)
-    min_width = np.minimum(_or(values["min_width"], WIDTH_SHARES[0] * side), max_width)
+    low, high = WIDTH_SHARES
+    least_width = _or(values["min_width"], np.zeros(n))
+    max_width = _or(values["max_width"], np.maximum(high * side, least_width))
+    min_width = _or(values["min_width"], np.minimum(low * side, max_width))
     max_width = np.maximum(max_width, min_width)
     strategy = values["strategy"]
     offset = _or(values["offset"], np.full(n, np.inf))

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import Blocks, ragged_rows
+from urban_processing.errors import BoundaryError
 from urban_processing.mesh.planar import IntArray
 from urban_processing.parcelling.ground import Ground, Pieces
 from urban_processing.parcelling.reuse import Parcels, Previous, pieces_of_parcels
@@ -30,6 +31,11 @@ def inherit(old: Blocks, new: Blocks) -> Blocks:
     BoundaryError
         If the blocks are in different CRSs.
     """
+    if old.frame.crs != new.frame.crs:
+        raise BoundaryError(
+            f"The subdivision before is in {_crs_name(old.frame)}, but the blocks are worked on in "
+            f"{_crs_name(new.frame)}: choose the CRS of the subdivision with crs (--crs)."
+        )
     columns, source = carry_block_columns(old, new)
     order = np.lexsort((-np.round(shapely.area(new.polygons), 6), source))
     first = order[np.append(True, np.diff(source[order]) != 0)]
@@ -39,6 +45,12 @@ def inherit(old: Blocks, new: Blocks) -> Blocks:
     others = np.flatnonzero(block_id == 0)
     block_id[others] = old.block_id.max(initial=0) + 1 + np.arange(len(others))
     return dataclasses.replace(new, columns=columns, block_id=block_id)
+
+
+def _crs_name(frame: Frame) -> str:
+    """Code of a CRS, or the name in its definition."""
+    name = frame.crs.split('"')[1] if '"' in frame.crs else frame.crs
+    return name or "no CRS"
 
 
 def unchanged(

@@ -7,8 +7,9 @@ import shapely
 
 from urban_processing.access_rule import reached_frontage
 from urban_processing.mesh.planar import BoolArray, FloatArray
-from urban_processing.metrics.subdivisions import MeasuredSubdivision
+from urban_processing.metrics.subdivisions import MeasuredSubdivision, box_sides
 from urban_processing.params.subdivide import Strategy
+from urban_processing.parcelling.subdivision import Subdivision
 from urban_processing.site import AREA_ROUNDING, Issue
 
 LENGTH_ROUNDING = 1e-6
@@ -18,8 +19,9 @@ LENGTH_ROUNDING = 1e-6
 def bound_findings(measured: MeasuredSubdivision) -> list[Issue]:
     """List the parcels that break a bound, and those that no street reaches.
 
-    A block smaller than the smallest parcel is listed as such. The width of a parcel is the
-    shorter side of the smallest rotated rectangle around it (Vanegas 2012, section 4.1).
+    A block smaller than the smallest parcel is listed as such, and one that is nowhere as long as
+    parcels are to be wide, in place of its parcels. The width of a parcel is the shorter side of
+    the smallest rotated rectangle around it (Vanegas 2012, section 4.1).
     """
     made = measured.made
     pieces, rules = made.pieces, made.wanted.rules
@@ -31,6 +33,8 @@ def bound_findings(measured: MeasuredSubdivision) -> list[Issue]:
     small = parcel & (area < least * (1.0 - AREA_ROUNDING))
     large = parcel & (area > most * (1.0 + AREA_ROUNDING))
     width = measured.boxes[:, 0]
+    length = box_sides(made.blocks.polygons)[:, 1]
+    short = length < rules.min_width - LENGTH_ROUNDING
     narrow = parcel & ~small & (width < rules.min_width[block] - LENGTH_ROUNDING)
     wide = parcel & ~large & (width > rules.max_width[block] + LENGTH_ROUNDING)
     found = [
@@ -40,15 +44,33 @@ def bound_findings(measured: MeasuredSubdivision) -> list[Issue]:
          "{limit:.0f} m²: the block leaves no room."),
         ("parcel_large", large, area, most, "A parcel of {value:.0f} m² is larger than "
          "{limit:.0f} m²: no cut keeps the other bounds."),
-        ("parcel_narrow", narrow, width, rules.min_width[block], "A parcel is {value:.1f} m wide, "
-         "less than {limit:.1f} m."),
+        ("parcel_narrow", narrow & ~short[block], width, rules.min_width[block], "A parcel is "
+         "{value:.1f} m wide, less than {limit:.1f} m."),
         ("parcel_wide", wide, width, rules.max_width[block], "A parcel is {value:.1f} m wide, more "
          "than {limit:.1f} m."),
     ]  # fmt: skip
-    issues = []
+    issues = _short_blocks(made, length, short & np.isin(np.arange(len(short)), block[narrow]))
     for code, chosen, value, limit, message in found:
         issues += _each(measured, code, chosen, (value, limit), message)
     return [*issues, *_unreached(measured)]
+
+
+def _short_blocks(made: Subdivision, length: FloatArray, chosen: BoolArray) -> list[Issue]:
+    """Blocks that no parcel of the smallest width has room in."""
+    rows = np.flatnonzero(chosen)
+    least = made.wanted.rules.min_width
+    return [
+        Issue(
+            code="block_narrow",
+            message=f"A block is {length[row]:.1f} m long, less than the smallest width of a "
+            f"parcel, {least[row]:.1f} m: what it is divided into is narrower.",
+            part=row,
+            value=float(length[row]),
+            limit=float(least[row]),
+            geometry=shapely.point_on_surface(made.blocks.polygons[row]),
+        )
+        for row in rows.tolist()
+    ]
 
 
 def _unreached(measured: MeasuredSubdivision) -> list[Issue]:
