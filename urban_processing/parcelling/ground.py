@@ -46,6 +46,8 @@ class Ground:
 
     def of(self, rows: IntArray) -> Ground:
         """Return some of the polygons."""
+        if _are_all(rows, len(self)):
+            return self
         rings, edges = self.rings.of(rows)
         return Ground(
             rings, self.access[edges], self.width[edges], self.street[edges], self.lineage[rows]
@@ -151,6 +153,11 @@ class Pieces:
         )
 
 
+def _are_all(rows: IntArray, n: int) -> bool:
+    """Whether rows are all of n rows in their order."""
+    return len(rows) == n and bool((np.diff(rows) > 0).all())
+
+
 def sort_faces(pieces: Pieces) -> Pieces:
     """Put faces into the order of their blocks; those of one block stay in theirs."""
     order = np.argsort(pieces.block, kind="stable")
@@ -182,6 +189,8 @@ def join_parts(parts: Sequence[tuple[IntArray, Pieces]], ground: Ground) -> Piec
     ground
         The whole.
     """
+    if len(parts) == 1 and _are_all(parts[0][0], len(ground)):
+        return parts[0][1]
     n = len(ground.rings.xy)
     added = [pieces.xy[len(ground.of(rows).rings.xy) :] for rows, pieces in parts]
     edge_of = [ground.rings.of(rows)[1] for rows, _ in parts]
