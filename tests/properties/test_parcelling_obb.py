@@ -55,7 +55,7 @@ def same_shapes(one, other, *, within):
     kind=st.sampled_from(sorted(SHAPES)),
     seed=st.integers(0, 10**6),
     n=st.integers(3, 24),
-    min_area=st.sampled_from([60.0, 150.0, 400.0]),
+    min_area=st.sampled_from([100.0, 200.0, 400.0]),
     irregularity=st.sampled_from([0.0, 0.3, 1.0]),
     street_access=st.sampled_from([0.0, 0.5, 1.0]),
 )

@@ -17,6 +17,7 @@ from urban_processing.metrics.subdivisions import MeasuredSubdivision
 from urban_processing.params.subdivide import Strategy, SubdivideParams
 from urban_processing.parcelling.reuse import Previous
 from urban_processing.parcelling.subdivision import Subdivision
+from urban_processing.pipelines import subdivide as pipeline
 from urban_processing.pipelines.subdivide import subdivide
 from urban_processing.processes import process_pool
 from urban_processing.progress import CallbackProgress
@@ -86,8 +87,9 @@ def test_order_and_company_of_blocks_do_not_matter(strategy: Strategy, town: Blo
         assert polygons_of(fewer, k) == polygons_of(made, block)
 
 
-def test_processes_give_the_same_bytes(tmp_path: Path) -> None:
-    blocks = blocks_of(*city(22, 13))  # more than one batch
+def test_processes_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pipeline, "AT_ONCE", 8)
+    blocks = blocks_of(*city(5, 4))  # more than one batch
     files = []
     for name, workers in (("one", 0), ("two", 2)):
         if workers:

@@ -14,7 +14,7 @@ import shapely
 from urban_processing.blocks.streets import StreetLines, street_lines
 from urban_processing.site import snap_to_grid
 
-REACH = {"aleppo": 900, "auckland": 1200, "slc": 1200, "wuhan": 1800, "liechtenstein": 7000}
+REACH = {"aleppo": 900, "auckland": 1200, "slc": 1200, "wuhan": 1800, "liechtenstein": 5000}
 """Metres around the middle that tests look at."""
 
 CITIES = tuple(REACH)

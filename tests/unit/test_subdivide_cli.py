@@ -145,13 +145,21 @@ def test_streets_of_a_file_of_blocks_say_whose_corners_are(
 
 
 def test_a_plain_shapefile(folder: Path, tmp_path: Path) -> None:
-    shapefile = write(folder / "plain.shp", min_area=[300.0, 900.0], strategy=["obb", None])
+    shapefile = write(
+        folder / "plain.shp",
+        min_area=[300.0, 900.0],
+        strategy=["obb", None],
+        irregulari=[0.25, None],  # names in shapefiles have ten letters at most
+        street_acc=[None, 0.5],
+    )
     out = tmp_path / "p.gpkg"
     result = run(shapefile, "-o", out, "--irregularity", 0)
     assert result.exit_code == 0, result.output
     blocks = layer(out, "blocks")
     assert blocks.min_area.tolist() == [300, 900]
     assert blocks.strategy.tolist() == ["obb", "skeleton"]
+    assert blocks.irregularity.tolist() == [0.25, 0]
+    assert blocks.street_access.tolist() == [1, 0.5]
     assert layer(out, "parcels").groupby("block_id").area_m2.min().ge([300, 900]).all()
 
 

@@ -21,13 +21,17 @@ ObjectArray = npt.NDArray[np.object_]
 
 BLOCK_ID = "block_id"
 
+SHAPEFILE_NAME = 10
+"""Letters that the names of columns in a shapefile have at most."""
+
 BOUNDS = (("min_area", "max_area"), ("min_width", "max_width"))
 """Pairs of which the first must not be above the second."""
 
 
 def block_columns() -> tuple[str, ...]:
     """Return the names of the attributes of blocks that are looked for."""
-    return (BLOCK_ID, *(field.name for field in _fields()))
+    names = [field.name for field in _fields()]
+    return (BLOCK_ID, *names, *(n[:SHAPEFILE_NAME] for n in names if n[SHAPEFILE_NAME:]))
 
 
 def block_values(
@@ -36,6 +40,7 @@ def block_values(
     """Return the parameters that the columns set, row by row, and what is wrong with them.
 
     None stands where a cell is empty; NaN in a column of numbers is no empty cell but a mistake.
+    Names that a shapefile has cut short are known.
 
     Parameters
     ----------
@@ -50,10 +55,12 @@ def block_values(
     problems: list[str] = []
     out: dict[str, ObjectArray] = {}
     for field in _fields():
-        if field.name not in features.columns:
+        short = field.name[:SHAPEFILE_NAME]
+        values = features.columns.get(field.name, features.columns.get(short))
+        if values is None:
             continue
         read = _texts if issubclass(field.kind, enum.Enum) else _numbers
-        out[field.name] = read(field, features.columns[field.name], rows, called, problems)
+        out[field.name] = read(field, values, rows, called, problems)
     for low, high in BOUNDS:
         if low in out or high in out:
             _check_bounds(out, (low, high), params, rows, called, problems)
