@@ -244,3 +244,23 @@ def test_only_subdivisions_are_read(tmp_path: Path) -> None:
     (tmp_path / "text.gpkg").write_text("no database")
     with pytest.raises(BoundaryError, match="holds no subdivision"):
         read_subdivision(tmp_path / "text.gpkg", library=PYOGRIO)
+
+
+@pytest.mark.parametrize("hole", [(30, 30, 70, 50), (20, 20, 80, 60), (45, 35, 55, 45)])
+@pytest.mark.parametrize("offset", [None, 20.0])
+def test_rows_go_around_a_courtyard(hole: tuple[float, ...], offset: float | None) -> None:
+    blocks = blocks_of(shapely.box(0, 0, 100, 80).difference(shapely.box(*hole)))
+    made = subdivide(blocks, SubdivideParams(offset=offset))
+    assert_tile(made.pieces, ground_of_blocks(blocks), blocks.polygons)
+    assert made.pieces.n_faces > 7
+    assert not made.pieces.patio.any()
+    assert MeasuredSubdivision(made).parcels.reached.all()
+
+
+def test_a_block_without_skeleton_is_divided_by_boxes() -> None:
+    shell, hole = [(0, 0), (100, 0), (100, 80), (0, 80)], [(0, 40), (30, 30), (30, 50)]
+    blocks = blocks_of(shapely.Polygon(shell, [hole]))  # the hole touches the outline
+    for strategy in (Strategy.SKELETON, Strategy.HYBRID):
+        made = subdivide(blocks, SubdivideParams(strategy=strategy))
+        assert_tile(made.pieces, ground_of_blocks(blocks), blocks.polygons)
+        assert made.pieces.n_faces > 7

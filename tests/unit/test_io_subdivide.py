@@ -193,7 +193,8 @@ def test_the_crs_of_a_subdivision_before_can_be_asked_for(tmp_path: Path) -> Non
     ("column", "values", "said"),
     [
         ("min_area", [math.nan, 300.0],
-         "Column min_area must be a finite number, or an empty cell (None): nan in row 1 of"),
+         "Column min_area must be a finite number, or an empty cell (None in a column of "
+         "objects): nan in row 1 of"),
         ("max_width", [9, math.nan], "nan in row 2 of The frame"),
         ("min_width", ["wide", 300], "Column min_width must be a number: 'wide' in row 1 of"),
         ("patio", ["open", "pond"], "one of open, obb, skeleton, streamline: 'pond' in row 2"),
@@ -261,3 +262,10 @@ def test_bounds_must_leave_something_between_them() -> None:
     assert said == (
         "min_area must not be above max_area: 1200 and 1000 in row 2 of The frame (block 6)."
     )
+
+
+def test_what_was_made_can_be_divided_again() -> None:
+    land = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 100, 60)], crs="EPSG:32633")
+    made = up.subdivide(land, min_area=400)
+    again = up.subdivide(made.blocks)
+    assert again.parcels.geometry.geom_equals(made.parcels.geometry).all()

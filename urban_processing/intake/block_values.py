@@ -119,10 +119,16 @@ def _numbers(
     called: _Rows,
     problems: list[str],
 ) -> ObjectArray:
-    """Numbers of a parameter; None for empty cells."""
+    """Numbers of a parameter; None for empty cells.
+
+    A column of a parameter that may be left open is no column where all of it is NaN, as frames
+    have it of a layer with empty cells; NaN beside numbers is a mistake.
+    """
     out = np.full(len(values), None, dtype=object)
     unit = f" {field.param.unit}" if field.param.unit else ""
     wrong: dict[str, list[int]] = {}
+    if field.optional and all(is_blank(values[row]) for row in rows.tolist()):
+        return out
     for row in rows.tolist():
         value = values[row]
         if value is None:
@@ -147,11 +153,14 @@ def _shown(value: Any) -> str:
     return repr(value) if isinstance(value, str) else str(value)
 
 
+_FINITE = "a finite number, or an empty cell (None in a column of objects)"
+
+
 def _number(value: Any) -> str:
     """What a value must be but is not, if it is no finite number."""
     if isinstance(value, str | bool | np.bool_) or not isinstance(value, int | float | np.number):
         return "a number"
-    return "" if math.isfinite(value) else "a finite number, or an empty cell (None)"
+    return "" if math.isfinite(value) else _FINITE
 
 
 def _limits(field: ParamField, unit: str) -> list[tuple[str, Callable[[float], bool]]]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
+import shapely
 
 from urban_processing.params.subdivide import Patio, Strategy
 from urban_processing.parcelling.boxes.divide import divide_by_boxes
@@ -51,8 +52,25 @@ def divide(ground: Ground, wanted: BlockRules, *, seed: int) -> Pieces:
         if len(rows):
             rules = wanted.of(rows)
             pieces = run(ground.of(rows), rules.rules, seed=seed)
+            if run is divide_in_rows:
+                pieces = _with_whole_divided(pieces, rules.rules, seed=seed)
             parts.append((rows, _with_patios(pieces, rules, seed=seed)))
     return join_parts(parts, ground)
+
+
+def _with_whole_divided(pieces: Pieces, rules: Rules, *, seed: int) -> Pieces:
+    """Divide by boxes what rows have left whole: a contour that touches itself has no skeleton."""
+    size = np.diff(pieces.offsets)
+    whole = np.bincount(pieces.block)[pieces.block] == 1
+    at_street = np.bincount(pieces.face.repeat(size), weights=pieces.access) > 0
+    doubtful = np.flatnonzero(whole & at_street)
+    large = shapely.area(pieces.polygons()[doubtful]) > rules.max_area[pieces.block[doubtful]]
+    faces = doubtful[large]
+    if not len(faces):
+        return pieces
+    inside = ground_of_faces(pieces, faces)
+    divided = divide_by_boxes(inside, rules.of(pieces.block[faces]), seed=seed)
+    return replace_faces(pieces, faces, divided)
 
 
 def _with_patios(pieces: Pieces, wanted: BlockRules, *, seed: int) -> Pieces:

@@ -101,5 +101,5 @@ was."""
 TRANSFER: tuple[Layer, ...] = (TRANSFERRED_PARCELS, CHANGES, ISSUES, PROVENANCE)
 """All layers of a transfer."""
 
-MEASURED = frozenset(PARCELS.column_names) - {"parcel_id", "land_use", "locked"}
-"""Columns of parcels that say what a parcel is by its geometry: they are not carried over."""
+OWN = (frozenset(PARCELS.column_names) | {"strategy"}) - {"parcel_id"}
+"""Columns of parcels that say what a parcel is in its layout: they are not carried over."""

@@ -19,7 +19,7 @@ from urban_processing.persistence.block_match import NONE, taken
 from urban_processing.persistence.editions import Edition, Editions
 from urban_processing.persistence.layers import (
     CHANGES,
-    MEASURED,
+    OWN,
     TRANSFERRED_PARCELS,
     Change,
 )
@@ -132,7 +132,7 @@ def _listed(values: list[Any]) -> str:
 def _columns_to_carry(before: Edition, params: TransferParams) -> list[str]:
     """Names of the columns to carry, in the order of the layer."""
     if params.columns is None:
-        left_out = {*MEASURED, *TRANSFERRED_PARCELS.column_names, "fid", params.id_column}
+        left_out = {*OWN, *TRANSFERRED_PARCELS.column_names, "fid", params.id_column}
         return [n for n in before.columns if n not in left_out and n != params.block_column]
     missing = [name for name in params.column_names if name not in before.columns]
     if missing:

@@ -87,7 +87,9 @@ def unite(
         if not weak:
             break
         strip = min(weak, key=lambda s: (*rank_of(s, needs, widths=False), -s.rank))
-        host = _host(sheet, strip, strips, patio=patio)
+        # what has no street is given to the streets, not they to it
+        hosts = [s for s in strips if not s.street.rim or strip.street.rim]
+        host = _host(sheet, strip, hosts, patio=patio)
         if host is None or not _absorb(sheet, host, strip):
             barred.add(id(strip))
             continue
