@@ -286,7 +286,7 @@ def test_columns_set_parameters_block_by_block() -> None:
 @pytest.mark.parametrize(
     ("column", "values", "said"),
     [
-        ("min_area", [300, math.nan], "column of objects): nan in row 2"),
+        ("min_area", [300, math.nan], "empty cell (None): nan in row 2"),
         ("min_area", [-5, 300], "above 0 m²: -5 in row 1"),
         ("min_area", ["many", 300], "a number: 'many' in row 1"),
         ("min_area", [True, 300], "a number: True in row 1"),

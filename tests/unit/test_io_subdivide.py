@@ -193,8 +193,7 @@ def test_the_crs_of_a_subdivision_before_can_be_asked_for(tmp_path: Path) -> Non
     ("column", "values", "said"),
     [
         ("min_area", [math.nan, 300.0],
-         "Column min_area must be a finite number, or an empty cell (None in a column of "
-         "objects): nan in row 1 of"),
+         "Column min_area must be a finite number, or an empty cell (None): nan in row 1 of"),
         ("max_width", [9, math.nan], "nan in row 2 of The frame"),
         ("min_width", ["wide", 300], "Column min_width must be a number: 'wide' in row 1 of"),
         ("patio", ["open", "pond"], "one of open, obb, skeleton, streamline: 'pond' in row 2"),

@@ -153,14 +153,11 @@ def _shown(value: Any) -> str:
     return repr(value) if isinstance(value, str) else str(value)
 
 
-_FINITE = "a finite number, or an empty cell (None in a column of objects)"
-
-
 def _number(value: Any) -> str:
     """What a value must be but is not, if it is no finite number."""
     if isinstance(value, str | bool | np.bool_) or not isinstance(value, int | float | np.number):
         return "a number"
-    return "" if math.isfinite(value) else _FINITE
+    return "" if math.isfinite(value) else "a finite number, or an empty cell (None)"
 
 
 def _limits(field: ParamField, unit: str) -> list[tuple[str, Callable[[float], bool]]]:
