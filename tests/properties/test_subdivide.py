@@ -264,3 +264,14 @@ def test_a_block_without_skeleton_is_divided_by_boxes() -> None:
         made = subdivide(blocks, SubdivideParams(strategy=strategy))
         assert_tile(made.pieces, ground_of_blocks(blocks), blocks.polygons)
         assert made.pieces.n_faces > 7
+
+
+@pytest.mark.parametrize("strategy", [Strategy.SKELETON, Strategy.HYBRID])
+def test_small_patios_go_to_their_neighbours(strategy: Strategy) -> None:
+    lobes = [shapely.box(0, 0, 140, 140), shapely.box(140, 60, 170, 80)]
+    lobes.append(shapely.box(170, 38, 234, 102))  # 25 m deep rows leave 14 m by 14 m of it
+    blocks = blocks_of(shapely.union_all(lobes))
+    made = subdivide(blocks, PARAMS.replace(strategy=strategy, offset=25))
+    assert_tile(made.pieces, ground_of_blocks(blocks), blocks.polygons)
+    assert shapely.area(made.polygons).min() >= 300 * (1 - 1e-9)
+    assert made.pieces.patio.sum() == (strategy is Strategy.SKELETON)

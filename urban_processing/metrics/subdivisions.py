@@ -134,6 +134,8 @@ class MeasuredSubdivision:
                 "lineage": [f"{v:016x}" for v in pieces.lineage.tolist()],
                 "block_id": made.blocks.block_id[pieces.block],
                 "strategy": strategy[pieces.block],
+                "box_width_m": self.boxes[:, 0],
+                "box_length_m": self.boxes[:, 1],
             },
             to_map(made.polygons, made.blocks.frame),
         )

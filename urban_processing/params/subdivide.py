@@ -101,7 +101,8 @@ class SubdivideParams(Params):
         Param(
             label="Smallest width",
             help="Smallest width of parcels along the street; by default "
-            f"{WIDTH_SHARES[0]:g}·√(smallest parcel).",
+            f"{WIDTH_SHARES[0]:g}·√(smallest parcel). Oriented boxes go down to half of it rather "
+            "than leave a parcel above the largest area.",
             unit="m",
             above=0,
             group=_SIZE,

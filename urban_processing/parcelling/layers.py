@@ -45,6 +45,21 @@ SUBDIVIDED_PARCELS = Layer(
         *(_of_blocks(column) for column in PARCELS.columns),
         BLOCK_ID,
         Column("strategy", ColumnType.TEXT, "", "Strategy that made the parcel.", "Strategy"),
+        Column(
+            "box_width_m",
+            ColumnType.REAL,
+            "m",
+            "Shorter side of the smallest rotated rectangle around it: the width that bounds hold "
+            "for, at street corners too.",
+            "Width of its box",
+        ),
+        Column(
+            "box_length_m",
+            ColumnType.REAL,
+            "m",
+            "Longer side of that rectangle.",
+            "Length of its box",
+        ),
     ),
     PARCELS.title,
     shown=True,

@@ -101,5 +101,7 @@ was."""
 TRANSFER: tuple[Layer, ...] = (TRANSFERRED_PARCELS, CHANGES, ISSUES, PROVENANCE)
 """All layers of a transfer."""
 
-OWN = (frozenset(PARCELS.column_names) | {"strategy"}) - {"parcel_id"}
+OWN = (frozenset(PARCELS.column_names) | {"strategy", "box_width_m", "box_length_m"}) - {
+    "parcel_id"
+}
 """Columns of parcels that say what a parcel is in its layout: they are not carried over."""

@@ -22,7 +22,13 @@ from urban_processing.parcelling.rows.divided import (
     whole,
 )
 from urban_processing.parcelling.rows.mending import beta_strips
-from urban_processing.parcelling.rows.patios import joined, patio_faces, rows_and_patios
+from urban_processing.parcelling.rows.patios import (
+    joined,
+    noded,
+    parted,
+    patio_faces,
+    rows_and_patios,
+)
 from urban_processing.parcelling.rows.plots import Plots, edges_of
 from urban_processing.parcelling.rows.sheet import Sheet
 from urban_processing.parcelling.rows.slices import Lot, Slicer, rings_of_lots
@@ -42,7 +48,7 @@ TURN = 0.8
 TILED = 1e-9
 """Share of a polygon's area that its faces may miss or hold twice."""
 
-_PATIOS = 2**32
+_PATIOS, _SMALL_PATIOS = 2**32, 2**32 + 1
 """Rank of all patios among the strips of a block."""
 
 
@@ -151,12 +157,18 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     if left:
         patios = joined(sheet, patios, [strip.ring for strip in left])
     parts = [_lots(sheet, polygon, strip, bounds, seed=seed, wary=wary) for strip in strips]
-    plots = _plots(sheet, polygon, parts)
+    small, patios = parted(sheet, patios, bounds.min_area)
+    plots = _plots(sheet, polygon, parts, small)
     tidy(plots, bounds)
     if not wary:
         divide_large(plots, bounds)
     faces = [
-        Face([plots.rings[n], *plots.holes[n]], plots.lineage[n], plots.level[n])
+        Face(
+            [plots.rings[n], *plots.holes[n]],
+            plots.lineage[n],
+            plots.level[n],
+            patio=plots.front(n) <= 0.0,
+        )
         for n in sorted(plots.rings)
     ]
     faces += patio_faces(sheet, patios, child(polygon.lineage, _PATIOS))
@@ -208,7 +220,13 @@ def _lots(
     return strip, lots, lineage
 
 
-def _plots(sheet: Sheet, polygon: Polygon, parts: Sequence[tuple[Strip, list[Lot], int]]) -> Plots:
+def _plots(
+    sheet: Sheet,
+    polygon: Polygon,
+    parts: Sequence[tuple[Strip, list[Lot], int]],
+    patios: Sequence[list[list[int]]],
+) -> Plots:
+    """Lots of all strips, and patios that are too small to stay, as plots."""
     polygons: list[list[list[int]]] = []
     seeds: list[int] = []
     for strip, lots, lineage in parts:
@@ -216,4 +234,6 @@ def _plots(sheet: Sheet, polygon: Polygon, parts: Sequence[tuple[Strip, list[Lot
             polygons += shapes
             own = child(lineage, k)
             seeds += [own] + [child(own, j) for j in range(1, len(shapes))]
+    polygons += [noded(sheet, patio) for patio in patios]
+    seeds += [child(child(polygon.lineage, _SMALL_PATIOS), k) for k in range(len(patios))]
     return Plots(sheet, polygons, seeds, access=polygon.access)

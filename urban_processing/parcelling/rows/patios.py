@@ -84,16 +84,27 @@ def _chained(sheet: Sheet, after: dict[int, list[int]]) -> Iterable[Ring]:
         yield ring
 
 
+def parted(
+    sheet: Sheet, patios: Sequence[list[Ring]], least: float
+) -> tuple[list[list[Ring]], list[list[Ring]]]:
+    """Part patios into those smaller than a parcel, which go to their neighbours, and others."""
+    small: list[list[Ring]] = []
+    large: list[list[Ring]] = []
+    for patio in patios:
+        (small if sum(map(sheet.area, patio)) < least else large).append(patio)
+    return small, large
+
+
+def noded(sheet: Sheet, patio: Sequence[Ring]) -> list[Ring]:
+    """Return the rings of a patio with all points that were added on their edges."""
+    return [[w for u, v in edges_of(ring) for w in (u, *sheet.within(u, v))] for ring in patio]
+
+
 def patio_faces(sheet: Sheet, patios: Sequence[list[Ring]], lineage: int) -> list[Face]:
     """Return patios as faces, the largest first, with all points that were added on their edges."""
     found = []
     for patio in patios:
-        rings = []
-        for ring in patio:
-            noded: Ring = []
-            for u, v in edges_of(ring):
-                noded += [u, *sheet.within(u, v)]
-            rings.append(noded)
+        rings = noded(sheet, patio)
         found.append((sum(sheet.area(ring) for ring in rings), rings))
     found.sort(key=lambda f: (-round(f[0], 4), min((sheet.y[v], sheet.x[v]) for v in f[1][0])))
     return [Face(rings, child(lineage, k), 1, patio=True) for k, (_, rings) in enumerate(found)]
