@@ -12,6 +12,7 @@ from urban_processing.errors import Cancelled, UrbanError
 from urban_processing.progress import CallbackProgress
 
 _OPTION = re.compile(r"\s*\(--[^)]*\)")
+_EMPTY = re.compile(r"empty cell \(None[^)]*\)")
 
 
 def progress_to(feedback: QgsProcessingFeedback) -> CallbackProgress:
@@ -37,10 +38,10 @@ def in_qgis(sentence: str) -> str:
 
     >>> in_qgis("Give it with crs (--crs EPSG:code), or assign it.")
     'Give it with crs, or assign it.'
-    >>> in_qgis("It must be a number, or an empty cell (None).")
+    >>> in_qgis("It must be a number, or an empty cell (None in a column of objects).")
     'It must be a number, or an empty cell (NULL).'
     """
-    return _OPTION.sub("", sentence).replace("cell (None)", "cell (NULL)")
+    return _EMPTY.sub("empty cell (NULL)", _OPTION.sub("", sentence))
 
 
 @contextmanager
