@@ -35,7 +35,7 @@ from urban_processing.pipelines import transfer as persistence
 from urban_processing.pipelines.ground import given_layers
 from urban_processing.processes import process_pool
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
-from urban_processing.schema import BLOCK_EDGES, BLOCKS
+from urban_processing.schema import BLOCK_EDGES, BLOCKS, PARCELS
 from urban_processing.site import Site
 
 if TYPE_CHECKING:
@@ -351,11 +351,11 @@ def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
 
 
 def transfer(
-    before: Source | GeoLayout,
-    after: Source | GeoLayout,
+    before: Source | GeoLayout | GeoLayers,
+    after: Source | GeoLayout | GeoLayers,
     *,
-    blocks_before: Source | None = None,
-    blocks_after: Source | None = None,
+    blocks_before: Source | GeoLayers | None = None,
+    blocks_after: Source | GeoLayers | None = None,
     progress: Progress = SILENT,
     **parameters: Any,
 ) -> GeoLayers:
@@ -368,9 +368,9 @@ def transfer(
     ----------
     before, after
         Parcels: files, GeoDataFrames or geometries; or layouts, also as files: then their
-        streets say what a block is.
+        streets say what a block is. What `subdivide` made has parcels and their blocks.
     blocks_before, blocks_after
-        Polygons of blocks, or lines around them, likewise.
+        Polygons of blocks, or lines around them, likewise; or what `find_blocks` made.
     progress
         Told how far the work is; may stop it.
     **parameters
@@ -405,11 +405,28 @@ def transfer(
     return GeoLayers(persistence.transfer(editions, params, progress))
 
 
-def _state(parcels: Source | GeoLayout, blocks: Source | None) -> tuple[Source, Source | None]:
+def _state(
+    parcels: Source | GeoLayout | GeoLayers, blocks: Source | GeoLayers | None
+) -> tuple[Source, Source | None]:
     """Return parcels, and blocks or the streets between them where they are known."""
+    if isinstance(blocks, GeoLayers):
+        blocks = _layer_of(blocks, BLOCKS.name)
+    if isinstance(parcels, GeoLayers):
+        if blocks is None and BLOCKS.name in parcels.made.names:
+            blocks = parcels.frame(BLOCKS.name)
+        return _layer_of(parcels, PARCELS.name), blocks
     if not isinstance(parcels, GeoLayout):
         return parcels, blocks
     return parcels.parcels, parcels.streets if blocks is None else blocks
+
+
+def _layer_of(layers: GeoLayers, name: str) -> gpd.GeoDataFrame:
+    """Return a layer of what an algorithm made."""
+    if name not in layers.made.names:
+        raise BoundaryError(
+            f"There is no layer {name} in {layers!r}; there are {', '.join(layers.made.names)}."
+        )
+    return layers.frame(name)
 
 
 def _layout(
@@ -426,6 +443,11 @@ def _layout(
         return layout.layout
     if isinstance(layout, Layout):
         return layout
+    if isinstance(layout, GeoLayers):
+        raise BoundaryError(
+            "GeoLayers is no layout: give parcels=made.parcels of what subdivide made and "
+            "streets=found.block_edges of what find_blocks found."
+        )
     if not isinstance(layout, str | PathLike):
         raise BoundaryError(
             f"{type(layout).__name__} is no layout: give what cogenerate made, or its file."

@@ -108,6 +108,18 @@ NO_STREETS: frozenset[str] = frozenset(
 )  # fmt: skip
 """Values of ``highway`` that are no streets."""
 
+OSM_KEYS: tuple[str, ...] = (
+    "aerialway",
+    "barrier",
+    "man_made",
+    "other_tags",
+    "power",
+    "railway",
+    "waterway",
+)
+"""Columns that tell that a layer has all lines of OpenStreetMap: other things that lines are, and
+what GDAL calls the rest of their tags."""
+
 VERGES = 6.0
 """Metres that pavements and verges add to the carriageway of OpenStreetMap's ``width``."""
 

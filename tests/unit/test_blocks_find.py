@@ -138,6 +138,33 @@ def test_widths_follow_from_classes() -> None:
     assert set(out.right_of_way_class.tolist()) == set(classes)
 
 
+def test_classes_of_unknown_width_are_named() -> None:
+    classes = ["lane", "alley", "lane", ""]
+    out = found(rectangle(200, 200), width=np.nan, known={"street_class": classes})
+    (issue,) = out.blocks.issues
+    assert (issue.code, issue.value) == ("width_assumed", 4)
+    assert "no class of known width" not in issue.message
+    assert "(lane, alley): 12 m" in issue.message
+    many = found(
+        [*rectangle(200, 200), *rectangle(100, 100)],
+        width=np.nan,
+        known={"street_class": list("abcdefgh")},
+    )
+    assert any("(a, b, c, d, e and 3 more)" in issue.message for issue in many.blocks.issues)
+
+
+def test_widths_of_classes_that_no_street_has_are_told() -> None:
+    out = found(
+        rectangle(200, 200),
+        width=np.nan,
+        known={"street_class": ["residential", "residential", "service", "primary"]},
+        class_widths="residental=14; service=6; zzz=3",
+    )
+    (issue,) = out.blocks.issues
+    assert (issue.code, issue.value) == ("class_widths_unused", 2)
+    assert issue.message.endswith("residental (is residential meant?), zzz.")
+
+
 @pytest.mark.parametrize("text", ["residential", "residential=wide", "=12", "a=-3", "a=nan"])
 def test_widths_by_class_that_are_none_are_refused(text: str) -> None:
     with pytest.raises(ParameterError, match="class-widths"):

@@ -16,7 +16,9 @@ from networks import CITIES, network_file
 import urban_processing as up
 from urban_processing.blocks.model import UNKNOWN_STREET, Blocks
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
+from urban_processing.intake.projection import Projection
 from urban_processing.io.blocks import read_blocks, read_streets
+from urban_processing.io.crs import PYPROJ
 from urban_processing.params.subdivide import Strategy, SubdivideParams
 from urban_processing.street_rules import CLASS_WIDTHS, LANE_WIDTH, VERGES
 
@@ -127,6 +129,77 @@ def test_streets_must_be_lines_with_a_crs() -> None:
         lines = frame([shapely.LineString([(0, 0), (math.nan, 3)])])
     with pytest.raises(BoundaryError, match="not finite"):
         read_streets(lines)
+
+
+OSM = {"railway": [None, None, "rail", None, None]}
+
+
+def of_osm(**columns: Any) -> gpd.GeoDataFrame:
+    """A square of streets, and a line across without a highway."""
+    square = [line(a, b) for a, b in zip(CORNERS, [*CORNERS[1:], CORNERS[0]], strict=True)]
+    across = line((0, 50), (100, 50))
+    return frame([*square[:2], across, *square[2:]], **columns)
+
+
+CORNERS = [(0, 0), (100, 0), (100, 100), (0, 100)]
+HIGHWAYS = ["residential", "service", None, "primary", "residential"]
+
+
+@pytest.mark.parametrize("empty", [None, math.nan, ""])
+def test_lines_without_a_highway_among_all_of_openstreetmap_are_no_streets(empty: Any) -> None:
+    values = [empty if value is None else value for value in HIGHWAYS]
+    found = up.find_blocks(of_osm(highway=pd.Series(values, dtype=object), **OSM))
+    assert len(found.blocks) == 1
+    (issue,) = found.issues.itertuples()
+    assert (issue.code, issue.value) == ("no_highway", 1)
+    assert "1 line(s) of The frame have no highway" in issue.message
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"highway": HIGHWAYS},
+        {"highway": [None] * 5, **OSM},
+        {"highway": HIGHWAYS, "width_m": [None, None, 8.0, None, None], **OSM},
+        {"highway": HIGHWAYS, "class": ["", "", "local", "", ""], **OSM},
+        OSM,
+    ],
+    ids=["merged network", "no highway at all", "own width", "own class", "no column"],
+)
+def test_lines_without_a_highway_may_be_streets(columns: dict[str, Any]) -> None:
+    found = up.find_blocks(of_osm(**columns))
+    assert len(found.blocks) == 2
+    assert "no_highway" not in found.issues.code.tolist()
+
+
+def test_lines_that_are_no_streets_are_none_beside_blocks_either() -> None:
+    lines = of_osm(highway=HIGHWAYS, **OSM)
+    blocks = read_blocks(frame([box(5, 5, 95, 49), box(5, 51, 95, 95)]), streets=lines)
+    assert told(blocks)["no_highway"] == 1
+    rings = blocks.rings
+    beside = np.abs((rings.xy + rings.xy[rings.following])[:, 1] / 2 + blocks.frame.origin[1] - Y)
+    inner = (beside > 48) & (beside < 52)
+    assert inner.sum() == 2
+    assert np.isnan(blocks.edge_width[inner]).all()
+
+
+def test_lines_without_length_in_degrees_are_dropped() -> None:
+    ring = shapely.LineString([(7.0, 50.0), (7.002, 50.0), (7.002, 50.001), (7.0, 50.001), (7, 50)])
+    point = shapely.LineString([(7.001, 50.0005)] * 2)
+    for lines in ([ring, point], [shapely.MultiLineString([ring, point])]):
+        found = up.find_blocks(frame(lines, "EPSG:4326"))
+        assert len(found.blocks) == 1
+        told = found.issues.set_index("code").value
+        assert told["tiny_lines"] == 1
+
+
+def test_wide_lines_in_degrees_may_have_members_without_length() -> None:
+    long = shapely.LineString([(7.0, 50.0), (8.0, 50.0)])
+    several = shapely.MultiLineString([long, [(7.5, 50.1)] * 2])
+    projection = Projection(PYPROJ.from_text("EPSG:4326"), PYPROJ.from_text(UTM), PYPROJ)
+    alone, among = projection.geometries(np.array([long, several], dtype=object))
+    assert len(alone.coords) == 5
+    assert among.equals(alone)
 
 
 def test_streets_in_degrees_become_metric() -> None:
@@ -240,6 +313,25 @@ def test_overlaps_of_a_hair_go_to_the_larger_block() -> None:
     assert shapely.coverage_is_valid(blocks.polygons)
     assert shapely.area(blocks.polygons).sum() == pytest.approx(130 * 50)
     assert blocks.edge_access.shape == blocks.edge_width.shape
+
+
+@pytest.mark.parametrize(
+    ("east", "north", "kept"),
+    [(80.09, 50, True), (80.11, 50, False), (80.9, 3, True), (80.9, 9, False)],
+    ids=["thin", "not thin", "small", "not small"],
+)
+def test_overlaps_are_trimmed_where_they_are_thin_or_small(
+    east: float, north: float, kept: bool
+) -> None:
+    first = shapely.union(box(0, 0, 80, 50), box(80, 0, east, north))
+    two = frame([first, box(80, 0, 160, 50)])
+    if kept:
+        blocks = read_blocks(two)
+        assert told(blocks) == {"overlaps_trimmed": 1.0}
+        assert shapely.coverage_is_valid(blocks.polygons)
+        assert shapely.area(blocks.polygons).sum() == pytest.approx(160 * 50)
+    else:
+        assert "row 1 and 2" in problems_of(two)
 
 
 def test_multipolygons_become_several_blocks() -> None:

@@ -245,7 +245,7 @@ def test_what_is_no_subdivision_before(found: up.GeoLayers) -> None:
 
 def test_a_subdivision_is_no_layout(tmp_path: Path) -> None:
     made = up.subdivide(frame())
-    with pytest.raises(BoundaryError, match="GeoLayers is no layout: give what cogenerate made"):
+    with pytest.raises(BoundaryError, match=r"GeoLayers is no layout: give parcels=made.parcels"):
         up.optimize(made)
     file = made.save(tmp_path / "made.gpkg")
     for read in (up.optimize, up.read_layout):

@@ -11,6 +11,7 @@ from urban_processing.params.blocks import BlocksParams
 from urban_processing.progress import Progress
 from urban_processing.schema import BLOCK_EDGES, ISSUES, PROVENANCE, RIGHT_OF_WAY
 from urban_processing.schema import BLOCKS as BLOCK_LAYER
+from urban_processing.street_rules import OSM_KEYS
 
 
 def _run(inputs: Mapping[str, Any], params: BlocksParams, progress: Progress) -> Mapping[str, Any]:
@@ -34,7 +35,10 @@ BLOCKS = AlgorithmSpec(
         "Widths are those of the whole right-of-way. They come from a column width_m or width, "
         "else from the class of the street in a column class or highway. In data of OpenStreetMap "
         "(with a column highway), width is that of the carriageway and 6 m are added for "
-        "pavements and verges; lanes say how wide a street is at least. Streets of one name (a "
+        "pavements and verges; lanes say how wide a street is at least. A layer that has, besides "
+        f"highway, a column {', '.join(OSM_KEYS[:-1])} or {OSM_KEYS[-1]} holds lines of all kinds: "
+        "those without a highway are no streets there and are left out, unless they have a width_m "
+        "or class. In other layers they are streets of unknown class. Streets of one name (a "
         "column name) are one street, others go on straight at junctions.\n\n"
         "With land, blocks are cut at its rim, which is a street side only where a street runs "
         "along it. The layers of blocks and of their edges are what subdivision into parcels takes."

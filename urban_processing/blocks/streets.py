@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +18,8 @@ from urban_processing.site import Frame, Issue
 from urban_processing.street_rules import FOOTPATHS, NO_STREETS
 
 StrArray = npt.NDArray[np.str_]
+
+_MAX_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +136,7 @@ def chosen_streets(streets: StreetLines, params: BlocksParams) -> tuple[StreetLi
     issues
         What was left out or assumed.
     """
-    issues = []
+    issues = _without_street(streets, params)
     banned = NO_STREETS if params.footpaths else NO_STREETS | FOOTPATHS
     out = np.isin(streets.street_class, sorted(banned))
     if out.any():
@@ -145,8 +150,8 @@ def chosen_streets(streets: StreetLines, params: BlocksParams) -> tuple[StreetLi
     unknown = np.isnan(kept.width) & np.isnan(by_class)
     if unknown.any():
         message = (
-            f"{int(unknown.sum())} street line(s) have neither a width nor a class of known width: "
-            f"{params.default_width:g} m are taken."
+            f"{int(unknown.sum())} street line(s) have neither a width nor a class of known width"
+            f"{_named_classes(kept.street_class[unknown])}: {params.default_width:g} m are taken."
         )
         issues.append(
             Issue("width_assumed", message, value=float(unknown.sum()), limit=params.default_width)
@@ -155,6 +160,33 @@ def chosen_streets(streets: StreetLines, params: BlocksParams) -> tuple[StreetLi
     width = np.where(unknown, params.default_width, width)
     issues += _off_ground(kept)
     return _in_order(kept, width), issues
+
+
+def _named_classes(classes: StrArray) -> str:
+    """Classes in brackets, the most frequent first; nothing where there are none."""
+    count = Counter(name for name in classes.tolist() if name)
+    names = sorted(count, key=lambda name: (-count[name], name))
+    return f" ({_listed(names)})" if names else ""
+
+
+def _without_street(streets: StreetLines, params: BlocksParams) -> list[Issue]:
+    """Say for which classes a width was given that no street has, and what may be meant."""
+    there = np.unique(streets.street_class).tolist()
+    unused = [name for name in params.own_width_m if name not in there]
+    if not unused:
+        return []
+    likely = [get_close_matches(name, there, n=1) for name in unused]
+    said = [
+        f"{name} (is {like[0]} meant?)" if like else name
+        for name, like in zip(unused, likely, strict=True)
+    ]
+    message = f"Widths were given for classes that no street has: {_listed(said)}."
+    return [Issue("class_widths_unused", message, value=float(len(unused)))]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MAX_NAMED} more" if len(names) > _MAX_NAMED else ""
+    return ", ".join(names[:_MAX_NAMED]) + more
 
 
 def _off_ground(streets: StreetLines) -> list[Issue]:

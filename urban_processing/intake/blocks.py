@@ -40,8 +40,11 @@ from urban_processing.site import GRID, Frame, Issue
 C = TypeVar("C")
 ObjectArray = npt.NDArray[np.object_]
 
-HAIR = 0.01
-"""Overlaps of blocks that are nowhere wider than this, in metres, come from rounding."""
+HAIR = 0.1
+"""Overlaps of blocks that are nowhere wider than this, in metres, come from drawing."""
+
+TRIFLE = 1e-3
+"""So do those below this share of the smaller block."""
 
 _TOO_LARGE = 2**62
 """Numbers of blocks stay below, so that new ones fit above them."""
@@ -68,9 +71,9 @@ def build_blocks(
     """Make a layer of blocks ready for subdivision.
 
     Invalid outlines are repaired; a multipolygon becomes several blocks, of which the largest
-    keeps the number. Blocks may touch; overlaps up to a centimetre wide go to the larger
-    block, wider ones are an error. All shells are street sides, holes are not, unless lines of
-    streets say otherwise.
+    keeps the number. Blocks may touch; overlaps nowhere wider than `HAIR`, or below the share
+    `TRIFLE` of the smaller block, go to the larger one, others are an error. All shells are
+    street sides, holes are not, unless lines of streets say otherwise.
 
     Parameters
     ----------
@@ -228,13 +231,15 @@ def _pieces(geometries: ObjectArray) -> tuple[ObjectArray, IntArray]:
 def _without_overlaps(
     polygons: ObjectArray, row: IntArray, given_id: IntArray | None, issues: list[Issue]
 ) -> tuple[ObjectArray, IntArray]:
-    """Trim overlaps of a hair; raise for the others, naming the pairs."""
+    """Trim overlaps of a hair or a trifle; raise for the others, naming the pairs."""
     a, b = shapely.STRtree(polygons).query(polygons, predicate="intersects")
     a, b = a[a < b], b[a < b]
     shared = shapely.intersection(polygons[a], polygons[b])
     overlap = shapely.area(shared) > 0
     a, b, shared = a[overlap], b[overlap], shared[overlap]
-    wide = ~shapely.is_empty(shapely.buffer(shared, -HAIR / 2))
+    smaller = np.minimum(shapely.area(polygons[a]), shapely.area(polygons[b]))
+    wide = shapely.area(shared) >= TRIFLE * smaller
+    wide[wide] = ~shapely.is_empty(shapely.buffer(shared[wide], -HAIR / 2))
     if wide.any():
         raise BoundaryError(_overlap_problems(a[wide], b[wide], shared[wide], row, given_id))
     if not len(a):
@@ -246,7 +251,8 @@ def _without_overlaps(
         small, large = sorted((i, j), key=keys.__getitem__)
         out[small] = shapely.difference(out[small], out[large], grid_size=GRID)
     message = (
-        f"{len(a)} overlap(s) of blocks, no wider than {HAIR:g} m, were left to the larger block."
+        f"{len(a)} overlap(s) of blocks, no wider than {HAIR:g} m or below {TRIFLE:.1%} of the "
+        "smaller block, were left to the larger one."
     )
     issues.append(Issue("overlaps_trimmed", message, value=float(len(a)), limit=HAIR))
     pieces, of = _pieces(out)

@@ -52,5 +52,21 @@ class Projection(Generic[C]):
         if self.source is None or self.is_identity:
             return geometries
         if self.library.facts(self.source).geographic:
-            geometries = shapely.segmentize(geometries, MAX_STEP_DEGREES)
+            geometries = _densified(geometries)
         return np.asarray(shapely.transform(geometries, self.points), dtype=object)
+
+
+def _densified(geometries: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+    """Geometries in degrees with several edges for each long one.
+
+    GEOS fails on lines without length: alone they are none of those with long edges, as members
+    of such they are left out.
+    """
+    west, south, east, north = shapely.bounds(geometries).T
+    wide = np.flatnonzero(np.hypot(east - west, north - south) > MAX_STEP_DEGREES)
+    out = np.array(geometries, dtype=object)
+    for i in wide[shapely.get_type_id(out[wide]) == shapely.GeometryType.MULTILINESTRING]:
+        lines = shapely.get_parts(out[i])
+        out[i] = shapely.multilinestrings(lines[shapely.length(lines) > 0])
+    out[wide] = shapely.segmentize(out[wide], MAX_STEP_DEGREES)
+    return out

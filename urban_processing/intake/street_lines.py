@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -26,16 +24,18 @@ from urban_processing.intake.given import (
     text,
     wrong_kind,
 )
+from urban_processing.intake.osm_lines import HIGHWAY, without_other_lines
 from urban_processing.intake.projection import Projection
 from urban_processing.intake.sites import build_site
+from urban_processing.intake.tag_values import length_of, values_of
 from urban_processing.intake.working import source_crs, working_crs
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import Frame, Issue, snap_to_grid
-from urban_processing.street_rules import CLASS_WIDTHS, LANE_WIDTH, VERGES
+from urban_processing.street_rules import CLASS_WIDTHS, LANE_WIDTH, OSM_KEYS, VERGES
 
 C = TypeVar("C")
 
-HIGHWAY, LANES = "highway", "lanes"
+LANES = "lanes"
 NAME_COLUMNS = ("name", "street_name")
 OFF_GROUND = ("bridge", "tunnel", "layer")
 STREET_ID, ACCESS = "street_id", "access"
@@ -49,16 +49,12 @@ STREET_COLUMNS = (
     *OFF_GROUND,
     STREET_ID,
     ACCESS,
+    *OSM_KEYS,
 )
 """Attributes of centrelines that are looked for."""
 
-FOOT = 0.3048
-
 MAX_NAMED = 5
 """Rows that a sentence names before it says how many more there are."""
-
-_NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?")
-_IN_FEET = re.compile(r"['′]|\bf(?:ee|oo)?t\b")
 
 
 def build_streets(
@@ -74,7 +70,8 @@ def build_streets(
     Class, width and name are read from their columns. In data of OpenStreetMap, which has a
     column ``highway``, ``width`` is that of the carriageway: pavements and verges are added;
     the number of lanes says how wide a street is at least. Lists, as OSMnx makes them, and units
-    are understood: the widest counts.
+    are understood: the widest counts. Of all lines of OpenStreetMap those are left out that are no
+    streets: see `urban_processing.intake.osm_lines`.
 
     Parameters
     ----------
@@ -103,6 +100,7 @@ def build_streets(
     own = source_crs(features, asked, library, found, issues)
     if found:
         raise BoundaryError(found)
+    features = without_other_lines(features, issues)
     lines, row = _lines(features)
     target = working_crs(
         shapely.get_coordinates(lines),
@@ -159,10 +157,12 @@ def street_lines_in(features: Features[C], projection: Projection[C], frame: Fra
     problems = wrong_kind(features, "Streets", "line")
     if problems:
         raise BoundaryError(problems)
+    issues: list[Issue] = []
+    features = without_other_lines(features, issues)
     lines, row = _lines(features)
     mapped = projection.of(features).geometries(lines)
     _must_be_finite(mapped, features.name)
-    return _street_lines(features, mapped, row, frame, [])
+    return _street_lines(features, mapped, row, frame, issues)
 
 
 def _lines(features: Features[Any]) -> tuple[npt.NDArray[np.object_], IntArray]:
@@ -283,28 +283,14 @@ def _read_columns(features: Features[Any]) -> _Known:
     )
 
 
-def _values(value: Any) -> list[Any]:
-    """Members of a list, of one that is written as text, or of text with semicolons."""
-    if isinstance(value, list | tuple | np.ndarray):
-        return list(value)
-    if isinstance(value, str):
-        if value.strip().startswith("["):
-            try:
-                return list(ast.literal_eval(value.strip()))
-            except (ValueError, SyntaxError):
-                return [value]
-        return [piece.strip() for piece in value.split(";")]
-    return [value]
-
-
 def _first(value: Any) -> Any:
-    return next(iter(_values(value)), None)
+    return next(iter(values_of(value)), None)
 
 
 def _class(value: Any) -> str:
     """The class, of several the highest."""
     order = {name: i for i, name in enumerate(CLASS_WIDTHS)}
-    found = [text(v) for v in _values(value)]
+    found = [text(v) for v in values_of(value)]
     return min(found, key=lambda name: (order.get(name, len(order)), name), default="")
 
 
@@ -313,7 +299,7 @@ def _lengths(features: Features[Any], column: str) -> tuple[FloatArray, int, lis
     values = features.columns[column]
     out, ignored, bad = np.full(len(values), np.nan), 0, []
     for row in features.present():
-        found = [_length(v) for v in _values(values[row]) if not is_blank(v)]
+        found = [length_of(v) for v in values_of(values[row]) if not is_blank(v)]
         numbers = [v for v in found if not math.isnan(v)]
         ignored += len(numbers) < len(found) and not numbers
         if not numbers:
@@ -330,22 +316,6 @@ def _lengths(features: Features[Any], column: str) -> tuple[FloatArray, int, lis
     return out, ignored, problems
 
 
-def _length(value: Any) -> float:
-    """A number, also one written with its unit; NaN for none."""
-    if isinstance(value, bool):
-        return math.nan
-    if not isinstance(value, str):
-        try:
-            return float(value)
-        except (TypeError, ValueError):
-            return math.nan
-    found = _NUMBER.match(value.strip())
-    if found is None:
-        return math.nan
-    number = float(found.group().replace(",", "."))
-    return number * FOOT if _IN_FEET.search(value) else number
-
-
 def named_rows(rows: Sequence[int]) -> str:
     """Rows as people count them, from 1: ``2, 5, 7, 8, 9 and 3 more``."""
     more = f" and {len(rows) - MAX_NAMED} more" if len(rows) > MAX_NAMED else ""
@@ -354,4 +324,4 @@ def named_rows(rows: Sequence[int]) -> str:
 
 def _is_set(value: Any) -> bool:
     """Whether a bridge, a tunnel or a layer above or below the ground is said."""
-    return any(text(v) not in ("", "no", "0", "0.0", "False") for v in _values(value))
+    return any(text(v) not in ("", "no", "0", "0.0", "False") for v in values_of(value))

@@ -11,7 +11,7 @@ from pyogrio.errors import DataSourceError
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.layouts import build_layout
 from urban_processing.io.crs import PYPROJ
-from urban_processing.io.features import Source, read_features
+from urban_processing.io.features import Source, read_features, split_layer_name
 from urban_processing.layout import Layout
 from urban_processing.schema import PARCELS, STREETS
 
@@ -25,7 +25,8 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
     Parameters
     ----------
     parcels
-        Polygons: a file, a GeoDataFrame, a GeoSeries or shapely geometries.
+        Polygons: a file, also followed by a layer as in ``file.gpkg|layername=plots``, a
+        GeoDataFrame, a GeoSeries or shapely geometries.
     streets
         Lines, likewise; in another CRS they are reprojected.
     snap
@@ -42,8 +43,10 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
         ("Parcels", parcels, PARCELS, "polygon"),
         ("Streets", streets, STREETS, "line"),
     ):
+        path, named = split_layer_name(source)
+        chosen = named or layer_in(path, layer.name)
         try:
-            found.append(read_features(source, layer=layer_in(source, layer.name), kind=kind))
+            found.append(read_features(path, layer=chosen, kind=kind))
         except BoundaryError as error:
             problems += [f"{called}: {problem}" for problem in error.problems]
     if problems:

@@ -112,8 +112,13 @@ class BlocksParams(Params):
     @property
     def width_m(self) -> Mapping[str, float]:
         """Width by class."""
+        return MappingProxyType({**CLASS_WIDTHS, **self.own_width_m})
+
+    @property
+    def own_width_m(self) -> Mapping[str, float]:
+        """Width by class as far as it was given."""
         own, _ = _table(self.class_widths)
-        return MappingProxyType({**CLASS_WIDTHS, **own})
+        return MappingProxyType(own)
 
     def contradictions(self, called: Naming) -> list[str]:
         """Say what in the table of widths is none."""
