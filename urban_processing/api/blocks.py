@@ -1,173 +1,33 @@
-"""The library in one call: a boundary in, a layout out."""
+"""Streets to blocks, blocks to parcels, and parcels through edits, in one call each."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-import numpy.typing as npt
-
 from urban_processing.blocks.streets import StreetsOnLand
-from urban_processing.errors import BoundaryError, ParameterError, UrbanError
+from urban_processing.errors import BoundaryError, ParameterError
 from urban_processing.io.blocks import read_blocks, read_streets
-from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.editions import read_editions
 from urban_processing.io.features import Source
-from urban_processing.io.files import read_layout, read_subdivision
+from urban_processing.io.files import read_subdivision
 from urban_processing.io.frames import GeoLayers, GeoLayout
-from urban_processing.io.layouts import read_layers
-from urban_processing.layout import Layout
 from urban_processing.layout_file.subdivisions import previous_of
 from urban_processing.metrics.subdivisions import MeasuredSubdivision
 from urban_processing.params.blocks import BlocksParams
-from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.params.optimize import OptimizeParams
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.params.transfer import TransferParams
 from urban_processing.parcelling.reuse import Previous
 from urban_processing.pipelines import blocks as block_finding
-from urban_processing.pipelines import cogenerate as pipeline
-from urban_processing.pipelines import optimize as optimization
 from urban_processing.pipelines import subdivide as subdivision
 from urban_processing.pipelines import transfer as persistence
-from urban_processing.pipelines.ground import given_layers
 from urban_processing.processes import process_pool
-from urban_processing.progress import MANY_PARCELS, SILENT, Progress
+from urban_processing.progress import SILENT, Progress
 from urban_processing.schema import BLOCK_EDGES, BLOCKS, PARCELS
-from urban_processing.site import Site
 
 if TYPE_CHECKING:
     import geopandas as gpd
-
-
-def cogenerate(
-    boundary: Source | Site,
-    *,
-    crs: object = None,
-    layer: str | None = None,
-    where: str | None = None,
-    corners: Source | npt.ArrayLike | None = None,
-    streets: Source | None = None,
-    obstacles: Source | None = None,
-    locked: Source | None = None,
-    rim_lines: Source | None = None,
-    entries: Source | npt.ArrayLike | None = None,
-    progress: Progress = SILENT,
-    **parameters: Any,
-) -> GeoLayout:
-    """Divide land into well-shaped parcels, all reached by one connected street network.
-
-    Hierarchical co-generation (Chen 2024, sections 3 and 4): level by level, parcels are cut
-    along streamlines of a cross field and streets are added along parcel boundaries.
-
-    Parameters
-    ----------
-    boundary
-        A file, GeoDataFrame, GeoSeries or shapely polygon, or a `Site`.
-    crs, layer, where, corners, streets, obstacles, locked, rim_lines, entries
-        As in `urban_processing.io.boundaries.read_boundary`.
-    progress
-        Told how far the work is; may stop it.
-    **parameters
-        Fields of `CogenerateParams`; `min_area` (m²) or `parcels` is needed.
-
-    Returns
-    -------
-    GeoLayout
-        Parcels, streets, junctions, metrics and issues.
-
-    Raises
-    ------
-    BoundaryError, ParameterError
-        With everything that is wrong; an `UrbanError` where both land and parameters are.
-
-    References
-    ----------
-    Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban modeling.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> layout = cogenerate(shapely.box(0, 0, 200, 120), crs="EPSG:32630", min_area=1500)
-    >>> bool(layout.parcels.area_m2.min() >= 1500)
-    True
-    """
-    layers = {
-        "streets": streets,
-        "obstacles": obstacles,
-        "locked": locked,
-        "rim_lines": rim_lines,
-        "entries": entries,
-    }
-    given = [name for name, value in layers.items() if value is not None]
-    if isinstance(boundary, Site):
-        given += given_layers(boundary)
-    params, site = _gathered(
-        lambda: CogenerateParams.from_values(parameters, given),
-        lambda: _site(boundary, crs=crs, layer=layer, where=where, corners=corners, **layers),
-    )
-    expected = pipeline.estimate(site, params)
-    if expected.parcels > MANY_PARCELS and progress is SILENT:
-        warnings.warn(
-            f"About {expected.parcels:,} parcels: this will take about {expected.seconds:.0f} s. "
-            "Give a progress to follow it.",
-            stacklevel=2,
-        )
-    return GeoLayout(pipeline.cogenerate(site, params, progress))
-
-
-def optimize(
-    layout: GeoLayout | Layout | str | PathLike[str] | None = None,
-    *,
-    parcels: Source | None = None,
-    streets: Source | None = None,
-    progress: Progress = SILENT,
-    **parameters: Any,
-) -> GeoLayout:
-    """Smooth the streets and parcel sides of a layout and make its parcels more regular.
-
-    Global optimization (Chen 2024, section 5): vertices move, parcels and streets stay what
-    they are.
-
-    Parameters
-    ----------
-    layout
-        A layout, or a layout file, whose parcels and streets may have been edited.
-    parcels, streets
-        Instead: polygons and lines, as files, GeoDataFrames or geometries.
-    progress
-        Told how far the work is; may stop it.
-    **parameters
-        Fields of `OptimizeParams`.
-
-    Returns
-    -------
-    GeoLayout
-        With each energy before and after in the results of its last step.
-
-    Raises
-    ------
-    BoundaryError, ParameterError
-        With everything that is wrong.
-
-    References
-    ----------
-    Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban modeling.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> left, right = shapely.box(0, 0, 30, 40), shapely.box(30, 0, 60, 40)
-    >>> street = shapely.LineString([(0, 0), (60, 0)])
-    >>> layout = optimize(parcels=[left, right], streets=[street])
-    >>> [round(float(area)) for area in layout.parcels.area_m2]
-    [1200, 1200]
-    """
-    params = OptimizeParams.from_values(parameters)
-    given = _layout(layout, parcels, streets, params)
-    return GeoLayout(optimization.optimize(given, params, progress))
+from urban_processing.api.gathering import gathered
 
 
 def find_blocks(
@@ -216,7 +76,7 @@ def find_blocks(
     >>> found.blocks.area_m2.tolist()
     [1500.0, 2000.0]
     """
-    params, ground = _gathered(
+    params, ground = gathered(
         lambda: BlocksParams.from_values(parameters),
         lambda: _streets(streets, land=land, layer=layer, where=where, crs=crs),
     )
@@ -280,7 +140,7 @@ def subdivide(
             streets = blocks.frame(BLOCK_EDGES.name)
         blocks = _without_nan(blocks.frame(BLOCKS.name))
     usable = not SubdivideParams.problems_with(parameters)
-    params, ground, before, processes = _gathered(
+    params, ground, before, processes = gathered(
         lambda: SubdivideParams.from_values(parameters),
         lambda: read_blocks(
             blocks,
@@ -301,53 +161,6 @@ def subdivide(
                 ground, params, progress, previous=before, executor=executor
             )
     return GeoLayers(MeasuredSubdivision(made).layers())
-
-
-def _gathered(*steps: Callable[[], Any]) -> list[Any]:
-    """Take all steps and return what they give; raise all that is wrong with any together."""
-    errors: list[UrbanError] = []
-    found = []
-    for step in steps:
-        try:
-            found.append(step())
-        except (ParameterError, BoundaryError) as error:
-            errors.append(error)
-    if errors:
-        raise errors[0] if len(errors) == 1 else UrbanError(p for e in errors for p in e.problems)
-    return found
-
-
-def _number_of_processes(given: int) -> int:
-    if given < 1:
-        raise ParameterError(f"processes must be at least 1; got {given}.")
-    return given
-
-
-def _previous(given: GeoLayers | str | PathLike[str] | None) -> Previous | None:
-    if given is None:
-        return None
-    if isinstance(given, GeoLayers):
-        return previous_of(given.made)
-    if not isinstance(given, str | PathLike):
-        raise BoundaryError(
-            f"{type(given).__name__} is no subdivision: give what subdivide made, or its file."
-        )
-    return read_subdivision(given)
-
-
-def _without_nan(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """A frame of our own layers, in which NaN stands for an empty cell, with None there."""
-    attributes = frame.drop(columns=frame.geometry.name).astype(object)
-    return frame.assign(**attributes.where(attributes.notna(), None))
-
-
-def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
-    if not isinstance(source, StreetsOnLand):
-        return read_streets(source, **options)
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise BoundaryError(f"Streets are ready as they are: leave out {', '.join(given)}.")
-    return source
 
 
 def transfer(
@@ -405,6 +218,39 @@ def transfer(
     return GeoLayers(persistence.transfer(editions, params, progress))
 
 
+def _number_of_processes(given: int) -> int:
+    if given < 1:
+        raise ParameterError(f"processes must be at least 1; got {given}.")
+    return given
+
+
+def _previous(given: GeoLayers | str | PathLike[str] | None) -> Previous | None:
+    if given is None:
+        return None
+    if isinstance(given, GeoLayers):
+        return previous_of(given.made)
+    if not isinstance(given, str | PathLike):
+        raise BoundaryError(
+            f"{type(given).__name__} is no subdivision: give what subdivide made, or its file."
+        )
+    return read_subdivision(given)
+
+
+def _without_nan(frame: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """A frame of our own layers, in which NaN stands for an empty cell, with None there."""
+    attributes = frame.drop(columns=frame.geometry.name).astype(object)
+    return frame.assign(**attributes.where(attributes.notna(), None))
+
+
+def _streets(source: Source | StreetsOnLand, **options: Any) -> StreetsOnLand:
+    if not isinstance(source, StreetsOnLand):
+        return read_streets(source, **options)
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise BoundaryError(f"Streets are ready as they are: leave out {', '.join(given)}.")
+    return source
+
+
 def _state(
     parcels: Source | GeoLayout | GeoLayers, blocks: Source | GeoLayers | None
 ) -> tuple[Source, Source | None]:
@@ -427,38 +273,3 @@ def _layer_of(layers: GeoLayers, name: str) -> gpd.GeoDataFrame:
             f"There is no layer {name} in {layers!r}; there are {', '.join(layers.made.names)}."
         )
     return layers.frame(name)
-
-
-def _layout(
-    layout: GeoLayout | Layout | str | PathLike[str] | None,
-    parcels: Source | None,
-    streets: Source | None,
-    params: OptimizeParams,
-) -> Layout:
-    if (layout is None) == (parcels is None) or (parcels is None) != (streets is None):
-        raise BoundaryError("Give a layout, or parcels and streets.")
-    if layout is None:
-        return read_layers(parcels, streets, snap=params.snap)
-    if isinstance(layout, GeoLayout):
-        return layout.layout
-    if isinstance(layout, Layout):
-        return layout
-    if isinstance(layout, GeoLayers):
-        raise BoundaryError(
-            "GeoLayers is no layout: give parcels=made.parcels of what subdivide made and "
-            "streets=found.block_edges of what find_blocks found."
-        )
-    if not isinstance(layout, str | PathLike):
-        raise BoundaryError(
-            f"{type(layout).__name__} is no layout: give what cogenerate made, or its file."
-        )
-    return read_layout(layout, snap=params.snap).layout
-
-
-def _site(boundary: Source | Site, **options: Any) -> Site:
-    if not isinstance(boundary, Site):
-        return read_boundary(boundary, **options)
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise BoundaryError(f"A Site is ready as it is: leave out {', '.join(given)}.")
-    return boundary
