@@ -13,6 +13,7 @@ import shapely.affinity
 import shapely.ops
 from lands import LANDS, ell, ellipse, site_of, star
 
+from urban_processing.constraints.ground import divide_land
 from urban_processing.errors import BoundaryError, InfeasibleError, ParameterError
 from urban_processing.layout import NOT_FIXED, EdgeKind, Layout
 from urban_processing.metrics import certificate
@@ -276,6 +277,39 @@ def test_ends_join_within_the_tolerance(gap: float) -> None:
     assert not (ends_of(layout)).any()
     apart = laid_out(given(fixed_streets=lines), snap_tolerance=0.1, pattern="tree")
     assert any("fixed" in code for code in codes(apart)) or ends_of(apart).any() or gap < 0
+
+
+def near_corner(*places: tuple[float, float]) -> Site:
+    """A pointed land, and a street by way of places that are given from its point."""
+    land = shapely.Polygon([(0, 0), (400, 0), (430, 200), (400, 400), (0, 400)])
+    line = street((100, 210), *((430 + x, 200 + y) for x, y in places))
+    return given(land, fixed_streets=(line, street((100, 210), (0, 180))))
+
+
+@pytest.mark.parametrize(
+    "site",
+    [
+        near_corner((-2e-6, -1e-6), (0, 0)),
+        near_corner((-2e-6, -1e-6), (3e-6, 0)),
+        near_corner((-3e-5, 2e-5), (-1e-6, 1e-6), (50, 3)),
+        near_corner((-4e-4, 3e-4), (-1e-6, 2e-6)),
+        near_corner((-4e-4, 3e-4), (-1e-6, 2e-6), (-1e-6, 3e-5)),
+    ],
+)
+def test_no_edge_is_as_short_as_a_rounding_error(site: Site) -> None:
+    ground = divide_land(site, min_area=900, snap=1.0)
+    assert len(ground.polygons) == 2
+    assert shapely.coverage_is_valid(ground.polygons)
+    assert sum(p.area for p in ground.polygons) == pytest.approx(site.area, abs=1e-3)
+    for polygon in ground.polygons:
+        xy = shapely.get_coordinates(polygon)
+        assert np.hypot(*np.diff(xy, axis=0).T).min() > 1
+    length = np.hypot(*(ground.segments[:, 1] - ground.segments[:, 0]).T)
+    assert length.sum() == pytest.approx(
+        shapely.length([s.line for s in site.fixed_streets]).sum(), abs=60
+    )
+    layout = laid_out(site, parcels=None, min_area=900)
+    assert "parcel_not_cut" not in codes(layout)
 
 
 def test_a_given_dead_end_stays_and_is_told_of_where_nothing_joins_it() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.constraints.lines import Piece
+from urban_processing.constraints.lines import SAME, Piece
 from urban_processing.mesh.places import segments_on
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.site import GRID, Issue
@@ -131,6 +131,48 @@ class Linework:
         self.alive[edge] = False
         self._unlink(edge)
 
+    def contract(self, vertex: int, into: int) -> None:
+        """Move the edges of a vertex to another; of two that fall together one stays."""
+        for w, edge in list(self.out[vertex]):
+            self._unlink(edge)
+            same = next((e for v, e in self.out[into] if v == w), None)
+            if w == into or same is not None:
+                self.alive[edge] = False
+            else:
+                self.ends[edge] = (into, w)
+                self._link(edge)
+            if same is not None:
+                self.firm[same] |= self.firm[edge]
+                self.root[same] |= self.root[edge]
+                if self.street[same] < 0:
+                    self.street[same] = self.street[edge]
+
+    def without_short_edges(self, length: float, corners: set[complex]) -> None:
+        """Contract edges that are shorter than a length in metres, besides those of the rings.
+
+        Noding leaves such edges where a street ends, bends or is crossed beside a vertex. A
+        cut beside them would be no longer than a rounding error.
+
+        Parameters
+        ----------
+        length
+            Edges from this length on stay.
+        corners
+            Vertices of the rings, which stay where they are.
+        """
+        short = [(abs(self.z[b] - self.z[a]), e) for e, (a, b) in enumerate(self.ends)]
+        for _, edge in sorted(pair for pair in short if pair[0] < length):
+            a, b = self.ends[edge]
+            gone = abs(self.z[b] - self.z[a]) >= length or not self.alive[edge]
+            if gone or {self.z[a], self.z[b]} <= corners:
+                continue
+            self.contract(*sorted((a, b), key=lambda v: (self._hold(v, corners), -v)))
+
+    def _hold(self, vertex: int, corners: set[complex]) -> int:
+        """How little a vertex may move: 0 freely, 1 along a ring, 2 not at all."""
+        on_ring = any(self.firm[e] for _, e in self.out[vertex])
+        return 2 if self.z[vertex] in corners else int(on_ring)
+
     def loop(self, edge: int, start: int) -> tuple[float, set[tuple[int, int]]]:
         """Area of the loop to the left of an edge that leaves a vertex, and its steps.
 
@@ -191,10 +233,13 @@ def node_lines(
     is_root, is_inner = np.zeros((2, len(pairs)), dtype=bool)
     is_root[segments_on(segments, outer, ON)[1]] = True
     is_inner[segments_on(segments, inner, ON)[1]] = True
-    return Linework(
+    work = Linework(
         z=places.tolist(),
         ends=[(int(a), int(b)) for a, b in pairs],
         street=street.tolist(),
         firm=(is_root | is_inner).tolist(),
         root=is_root.tolist(),
     )
+    corners = shapely.get_coordinates([*outer, *inner])
+    work.without_short_edges(SAME, set((corners[:, 0] + 1j * corners[:, 1] + 0.0).tolist()))
+    return work

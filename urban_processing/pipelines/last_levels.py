@@ -17,6 +17,7 @@ from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.parcelling.divide import divide
 from urban_processing.parcelling.ground import Ground, Pieces
 from urban_processing.parcelling.rules import resolve_rules
+from urban_processing.pipelines.small_pieces import Whole, join_small
 
 TOGETHER = 1e-5
 """Metres within which vertices on both sides of a street are one."""
@@ -26,7 +27,8 @@ def divide_street_blocks(layout: Layout, params: SubdivideParams) -> Layout:
     """Divide every block of the street network into parcels, whatever it consisted of.
 
     A block into which streets lead that end there is divided parcel by parcel, so that these
-    streets stay. Locked parcels stay as they are.
+    streets stay. Locked parcels stay as they are. Pieces under the layout's smallest area are
+    joined to a neighbour.
 
     Parameters
     ----------
@@ -40,7 +42,7 @@ def divide_street_blocks(layout: Layout, params: SubdivideParams) -> Layout:
         return layout
     ground = _ground(layout, outlines)
     pieces = divide(ground, resolve_rules(params, len(ground)), seed=params.seed)
-    return _rebuilt(layout, outlines, pieces)
+    return _rebuilt(layout, outlines, pieces, join_small(pieces, layout.min_area))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,19 +116,20 @@ def _ground(layout: Layout, outlines: list[_Outline]) -> Ground:
     )
 
 
-def _rebuilt(layout: Layout, outlines: list[_Outline], pieces: Pieces) -> Layout:
-    """The layout with the pieces in place of the faces that they were made of."""
+def _rebuilt(layout: Layout, outlines: list[_Outline], pieces: Pieces, whole: Whole) -> Layout:
+    """The layout with the joined pieces in place of the faces that they were made of."""
     mesh = layout.mesh
     divided = np.zeros(mesh.n_faces, dtype=bool)
     divided[np.concatenate([outline.faces for outline in outlines])] = True
     kept = np.flatnonzero(~divided)
     first = np.array([outline.faces[0] for outline in outlines])
     level = np.array([layout.face_level[outline.faces].max() for outline in outlines])
-    before = np.append(kept, first[pieces.block])
-    levels = np.append(layout.face_level[kept], level[pieces.block] + pieces.level)
-    lineage = np.append(layout.face_lineage[kept], pieces.lineage)
+    block = pieces.block[whole.piece]
+    before = np.append(kept, first[block])
+    levels = np.append(layout.face_level[kept], level[block] + pieces.level[whole.piece])
+    lineage = np.append(layout.face_lineage[kept], pieces.lineage[whole.piece])
     # across a street the pieces know nothing of each other: each gets the other's vertices
-    polygons = np.append(mesh.face_polygons()[kept], pieces.polygons())
+    polygons = np.append(mesh.face_polygons()[kept], whole.polygons)
     coverage = fit_together(polygons, TOGETHER, places=mesh.xy)
     after = mesh_from_polygons(list(canonical_rings(coverage.polygons)))
     source = before[coverage.source]
