@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from urban_processing.constraints.lines import SAME
 from urban_processing.errors import BoundaryError
 from urban_processing.layout import ON_OBSTACLE, EdgeKind
 from urban_processing.mesh.places import nearest_on_ring, segments_on
@@ -75,7 +76,7 @@ def _crossings(site: Site, snap: float) -> FloatArray:
 def _placed(
     parts: list[shapely.Polygon], xy: FloatArray, part: int | None = None
 ) -> tuple[int, FloatArray]:
-    """Insert the vertex of a ring nearest to a place; return the part and the vertex."""
+    """Return the part and the vertex nearest to a place; it is inserted if there is none there."""
     here = shapely.Point(xy)
     if part is None:
         part = int(np.argmin(shapely.distance([p.exterior for p in parts], here)))
@@ -84,7 +85,7 @@ def _placed(
     k, foot, _ = nearest_on_ring(ring, xy)
     place = snap_to_grid(foot)
     for vertex in (ring[k], ring[k + 1]):
-        if np.hypot(*(vertex - place)) <= ON_OBSTACLE:
+        if np.hypot(*(vertex - place)) <= SAME:
             return part, np.asarray(vertex)
     parts[part] = shapely.Polygon(np.insert(ring, k + 1, place, axis=0), polygon.interiors)
     return part, place
