@@ -236,6 +236,17 @@ def test_weights_decide(rough: dict[str, Layout]) -> None:
     assert energy(Energy.REGULARITY, weight_regularity=40) < energy(Energy.REGULARITY)
 
 
+def test_a_movement_that_is_taken_back_is_told_of_once(
+    rough: dict[str, Layout], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layout = next(iter(rough.values()))
+    monkeypatch.setattr("urban_processing.optimization.optimize.SHORTENINGS", ())
+    once = optimize_geometry(layout, OptimizeParams().weights)
+    assert once.moved.max() == 0
+    twice = optimize_geometry(once.layout, OptimizeParams().weights).layout
+    assert [i.code for i in twice.issues].count("optimization_taken_back") == 1
+
+
 def test_nothing_to_optimize_is_a_mistake() -> None:
     with pytest.raises(ParameterError, match="nothing is left to optimize"):
         OptimizeParams(weight_regularity=0, weight_sides=0, weight_streets=0, weight_junctions=0)

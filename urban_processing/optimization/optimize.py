@@ -17,6 +17,7 @@ from urban_processing.optimization.safeguard import moved_to, safe_positions
 from urban_processing.optimization.solver import minimize
 from urban_processing.params.optimize import Energy
 from urban_processing.progress import SILENT, Progress
+from urban_processing.site import Issue
 from urban_processing.streets.network import StreetNetwork, street_network
 
 SOLVING = 0.7
@@ -70,7 +71,7 @@ def optimize_geometry(
     stays simple, large enough, reached and regular. Rim vertices slide along exactly straight
     runs of the rim (Eq. 9) or stay (Eq. 10), locked parcels stay. If all that makes the mean
     irregularity of the parcels or the mean deviation of junctions from 90° worse, the layout
-    stays as it is.
+    stays as it is, and its issues say so.
 
     Parameters
     ----------
@@ -100,8 +101,21 @@ def optimize_geometry(
         if (_figures(moved, street_network(moved)) <= before).all():
             best = moved
             break
+    else:
+        best = _told(layout)
     progress.update(1.0)
     return _summary(layout, best, objective, spacing)
+
+
+def _told(layout: Layout) -> Layout:
+    """The layout with an issue that says that it stays as it is."""
+    issue = Issue(
+        "optimization_taken_back",
+        "The optimization would have made the parcels more irregular or the junctions less "
+        "right-angled, since too many parcels cannot move: the layout stays as it was cut.",
+    )
+    before = tuple(known for known in layout.issues if known.code != issue.code)
+    return layout.replace(issues=(*before, issue))
 
 
 def _summary(before: Layout, after: Layout, objective: Objective, spacing: float) -> Optimized:
