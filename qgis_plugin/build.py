@@ -20,7 +20,7 @@ TOP = "urban_processing_qgis"
 """The one folder in the zip, and so the name of the package."""
 
 ENGINE = f"{TOP}.engine"
-EDGES = {"__init__.py", "__main__.py", "api.py", "cli", "io"}
+EDGES = {"__init__.py", "__main__.py", "api", "cli", "io"}
 """What of the library stays out: the rooms that talk to terminals, pyproj and geopandas."""
 
 OUT_OF_PLUGIN = {"build.py"}
