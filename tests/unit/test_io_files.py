@@ -23,7 +23,8 @@ from urban_processing.io.files import read_layout, write_layout
 from urban_processing.io.frames import GeoLayout
 from urban_processing.layout import Layout
 from urban_processing.layout_file import files
-from urban_processing.layout_file.files import as_written, check_output
+from urban_processing.layout_file.files import as_written
+from urban_processing.layout_file.writing import check_output
 from urban_processing.metrics.tables import layout_tables
 from urban_processing.provenance import Step
 from urban_processing.rebuild import canonical

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from urban_processing.mesh.corners import ring_neighbours
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.site import Frame, Issue
 
@@ -103,9 +104,7 @@ class BlockRings:
     @cached_property
     def following(self) -> IntArray:
         """(N,) next vertex in the ring of each vertex."""
-        after = np.arange(1, len(self.xy) + 1)
-        after[self.offsets[1:] - 1] = self.offsets[:-1]
-        return after
+        return ring_neighbours(self.offsets)[1]
 
     def of(self, rows: IntArray) -> tuple[BlockRings, IntArray]:
         """Return the rings of some polygons, in that order, and their edges in this one."""

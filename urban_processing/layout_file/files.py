@@ -15,7 +15,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.assembly import assemble_layout
-from urban_processing.errors import BoundaryError, OutputError, TopologyError, UrbanError
+from urban_processing.errors import BoundaryError, TopologyError, UrbanError
 from urban_processing.layout import NOT_FIXED, GivenStreet, Layout
 from urban_processing.layout_file.geopackage import (
     LAYERS_STATE,
@@ -24,7 +24,7 @@ from urban_processing.layout_file.geopackage import (
     read_state,
     write_geopackage,
 )
-from urban_processing.layout_file.writing import check_output, replacing
+from urban_processing.layout_file.writing import replacing, writable
 from urban_processing.mesh.places import line_segments, vertices_at
 from urban_processing.metrics.tables import layout_tables
 from urban_processing.provenance import Step, timeless
@@ -81,10 +81,7 @@ def write_layout(
     OutputError
         If the file cannot be written there.
     """
-    target = Path(path)
-    problems = check_output(target, overwrite=overwrite)
-    if problems:
-        raise OutputError(problems)
+    target = writable(path, overwrite=overwrite)
     known = layout_tables(layout) if tables is None else tables
     with replacing(target) as temporary:
         write_geopackage(

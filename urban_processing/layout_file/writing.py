@@ -66,10 +66,7 @@ def write_layer_set(
     OutputError
         If the file cannot be written there.
     """
-    target = Path(path)
-    problems = check_output(target, overwrite=overwrite)
-    if problems:
-        raise OutputError(problems)
+    target = writable(path, overwrite=overwrite)
     layers = made.layers(record_seconds=record_seconds)
     with replacing(target) as temporary:
         write_geopackage(
@@ -79,6 +76,15 @@ def write_layer_set(
             library=library,
             state=(LAYERS_STATE, _state(made)),
         )
+    return target
+
+
+def writable(path: str | PathLike[str], *, overwrite: bool) -> Path:
+    """Return the path of a GeoPackage that can be written; raise `OutputError` if it cannot."""
+    target = Path(path)
+    problems = check_output(target, overwrite=overwrite)
+    if problems:
+        raise OutputError(problems)
     return target
 
 

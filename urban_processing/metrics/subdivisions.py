@@ -79,14 +79,12 @@ class MeasuredSubdivision:
     def _rim(self) -> BoolArray:
         """(F,) parcels with an edge that no other parcel of the block has."""
         pieces = self.made.pieces
-        after = np.arange(1, len(pieces.vertex) + 1)
-        after[pieces.offsets[1:] - 1] = pieces.offsets[:-1]
-        a, b = pieces.vertex, pieces.vertex[after]
+        a, b = pieces.vertex, pieces.vertex[pieces.following]
         pair = np.minimum(a, b) * np.int64(len(pieces.xy)) + np.maximum(a, b)
         _, inverse, count = np.unique(pair, return_inverse=True, return_counts=True)
         alone = count[inverse.ravel()] == 1
         out = np.zeros(pieces.n_faces, dtype=bool)
-        out[np.repeat(pieces.face, np.diff(pieces.offsets))[alone]] = True
+        out[pieces.edge_face[alone]] = True
         return out
 
     def layers(self) -> LayerSet:

@@ -60,9 +60,8 @@ def divide(ground: Ground, wanted: BlockRules, *, seed: int) -> Pieces:
 
 def _with_whole_divided(pieces: Pieces, rules: Rules, *, seed: int) -> Pieces:
     """Divide by boxes what rows have left whole: a contour that touches itself has no skeleton."""
-    size = np.diff(pieces.offsets)
     whole = np.bincount(pieces.block)[pieces.block] == 1
-    at_street = np.bincount(pieces.face.repeat(size), weights=pieces.access) > 0
+    at_street = np.bincount(pieces.edge_face, weights=pieces.access) > 0
     doubtful = np.flatnonzero(whole & at_street)
     large = shapely.area(pieces.polygons()[doubtful]) > rules.max_area[pieces.block[doubtful]]
     faces = doubtful[large]

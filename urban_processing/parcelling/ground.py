@@ -11,6 +11,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import BlockRings, ragged_rows
+from urban_processing.mesh.corners import ring_neighbours
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 
 UintArray = npt.NDArray[np.uint64]
@@ -135,6 +136,16 @@ class Pieces:
     def n_faces(self) -> int:
         """Number of faces."""
         return len(self.block)
+
+    @property
+    def following(self) -> IntArray:
+        """(N,) place in `vertex` of the next vertex of the ring of each."""
+        return ring_neighbours(self.offsets)[1]
+
+    @property
+    def edge_face(self) -> IntArray:
+        """(N,) face of each edge."""
+        return np.repeat(self.face, np.diff(self.offsets))
 
     def polygons(self) -> npt.NDArray[np.object_]:
         """(F,) the faces as shapely polygons."""

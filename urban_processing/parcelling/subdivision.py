@@ -59,15 +59,12 @@ class Subdivision:
     def edge_frontage(self) -> FloatArray:
         """(N,) length of street along each edge of the rings of the parcels."""
         pieces = self.pieces
-        after = np.arange(1, len(pieces.vertex) + 1)
-        after[pieces.offsets[1:] - 1] = pieces.offsets[:-1]
-        step = pieces.xy[pieces.vertex[after]] - pieces.xy[pieces.vertex]
+        step = pieces.xy[pieces.vertex[pieces.following]] - pieces.xy[pieces.vertex]
         return np.where(pieces.access, np.hypot(step[:, 0], step[:, 1]), 0.0)
 
     @cached_property
     def frontage(self) -> FloatArray:
         """(F,) length in metres of the boundary of each parcel on streets."""
         pieces = self.pieces
-        of_edge = np.repeat(pieces.face, np.diff(pieces.offsets))
-        found = np.bincount(of_edge, weights=self.edge_frontage, minlength=pieces.n_faces)
+        found = np.bincount(pieces.edge_face, weights=self.edge_frontage, minlength=pieces.n_faces)
         return np.asarray(found, dtype=np.float64)
