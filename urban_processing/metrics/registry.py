@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
 INTERIOR = "_interior"
 """Suffix of a metric that is taken over interior parcels alone."""
+
+
+class Better(enum.StrEnum):
+    """Which values of a metric are better, where everybody would say the same."""
+
+    LOW = "low"
+    HIGH = "high"
+    NEITHER = ""
 
 
 @dataclass(frozen=True)
@@ -26,6 +35,8 @@ class MetricSpec:
         Whether it is taken over a set of parcels, and so for interior parcels alone too.
     by_part
         Whether it is given for each part of a land of several parts.
+    better
+        Which values are better.
     """
 
     name: str
@@ -34,6 +45,7 @@ class MetricSpec:
     definition: str
     of_parcels: bool = False
     by_part: bool = True
+    better: Better = Better.NEITHER
 
 
 _CHEN, _YANG = "Chen 2024, Table 1", "Yang 2013, section 7"
