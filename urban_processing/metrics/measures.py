@@ -18,7 +18,8 @@ from urban_processing.metrics.registry import INTERIOR, METRICS
 from urban_processing.rights_of_way import RightsOfWay, lay_out_rights_of_way
 from urban_processing.streets.block_length import BlockSides, longest_sides
 from urban_processing.streets.classes import NodeKind
-from urban_processing.streets.network import StreetNetwork, street_network
+from urban_processing.streets.network import street_network
+from urban_processing.streets.network_model import StreetNetwork
 
 SMALL_BLOCK = 3
 """Blocks of at most this many parcels count as small."""

@@ -18,7 +18,8 @@ from urban_processing.rights_of_way.surfaces import (
 )
 from urban_processing.street_rules import StreetClass
 from urban_processing.streets.classes import NodeKind
-from urban_processing.streets.network import StreetNetwork, street_network
+from urban_processing.streets.network import street_network
+from urban_processing.streets.network_model import StreetNetwork
 
 CLASSES: tuple[StreetClass, ...] = tuple(StreetClass)
 """Classes by rank: the higher one takes a junction."""
