@@ -10,9 +10,11 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import ragged_rows
+from urban_processing.fabric.model import ParcelRings
 from urban_processing.layout import PARCEL_USE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.metrics.parcels import ParcelMeasures, ParcelRings, measure_rings
+from urban_processing.metrics.parcels import ParcelMeasures, measure_rings
+from urban_processing.metrics.tables import parcel_columns
 from urban_processing.parcelling.layers import SUBDIVIDED_BLOCKS, SUBDIVIDED_PARCELS
 from urban_processing.parcelling.rules import rule_values
 from urban_processing.parcelling.subdivision import Subdivision
@@ -114,21 +116,10 @@ class MeasuredSubdivision:
                 "parcel_id": made.parcel_id,
                 "part": pieces.block,
                 "level": pieces.level,
-                "area_m2": p.area,
                 "net_area_m2": p.area,
-                "sides": p.sides,
-                "irregularity": p.irregularity,
-                "frontage_m": p.frontage,
-                "width_m": p.width,
-                "depth_m": p.depth,
-                "thinness": p.thinness,
-                "rim": p.rim,
+                **parcel_columns(p),
                 "land_use": np.where(pieces.patio, PATIO_USE, PARCEL_USE),
                 "locked": np.zeros(n, dtype=bool),
-                "reached": p.reached,
-                "through_lot": p.through,
-                "p_angle_deg": p.angle_deviation,
-                "p_area": p.area_ratio,
                 "lineage": [f"{v:016x}" for v in pieces.lineage.tolist()],
                 "block_id": made.blocks.block_id[pieces.block],
                 "strategy": strategy[pieces.block],
