@@ -1,0 +1,128 @@
+"""`ObservedParcels`: parcels as a layer has them, and which of them are streets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from urban_processing.blocks.noding import Centrelines
+from urban_processing.layout import PARCEL_USE
+from urban_processing.mesh.build import canonical_rings
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.site import Frame, Issue
+
+Geometries = npt.NDArray[np.object_]
+
+STREET_SHARE = 0.8
+"""A parcel with a larger share of its area in the rights-of-way is a street or a verge."""
+
+CROSSED_SHARE = 0.4
+"""So is one with a larger share than this, if streets run through it for `CROSSED_LENGTH`."""
+
+CROSSED_LENGTH = 1.0
+"""Length of centreline within a street's parcel over the root of its area."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedParcels:
+    """P parcels in local metres, on the grid of all coordinates.
+
+    Parameters
+    ----------
+    polygons
+        (P,) valid polygons; a parcel of several pieces is several.
+    parcel_id
+        (P,) numbers, unique.
+    land_use
+        (P,) text, `layout.PARCEL_USE` where nothing else is known.
+    frame
+        Where the local coordinates lie on the map.
+    issues
+        What reading them has to say.
+    input_sha256
+        Hash of the input, for provenance.
+    """
+
+    polygons: Geometries
+    parcel_id: IntArray
+    land_use: npt.NDArray[np.object_]
+    frame: Frame = field(default_factory=Frame)
+    issues: tuple[Issue, ...] = ()
+    input_sha256: str = ""
+
+    def __len__(self) -> int:
+        """Return the number of parcels."""
+        return len(self.polygons)
+
+    def take(self, rows: IntArray | BoolArray) -> ObservedParcels:
+        """Return some of the parcels."""
+        whole = ("frame", "issues", "input_sha256")
+        names = [f.name for f in fields(self) if f.name not in whole]
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+
+def observed_parcels(polygons: npt.ArrayLike) -> ObservedParcels:
+    """Return polygons as parcels of which nothing else is known, numbered as they come."""
+    shapes = np.asarray(polygons, dtype=object)
+    n = len(shapes)
+    return ObservedParcels(
+        canonical_rings(shapes),
+        np.arange(1, n + 1),
+        np.full(n, PARCEL_USE, dtype=object),
+    )
+
+
+def street_parcels(
+    polygons: Geometries, work: Centrelines, width: FloatArray, *, snap: float
+) -> BoolArray:
+    """(P,) which parcels are streets: cadastres have them as parcels, too.
+
+    A parcel is a street if the rights-of-way cover it but for `STREET_SHARE`, or if they cover
+    `CROSSED_SHARE` of it and centrelines run through it, further than `snap` off its boundary,
+    for `CROSSED_LENGTH`.
+
+    Parameters
+    ----------
+    polygons
+        (P,) parcels.
+    work, width
+        Segments of streets and the width of each.
+    snap
+        Metres.
+    """
+    out = np.zeros(len(polygons), dtype=bool)
+    if not len(work.line) or not len(polygons):
+        return out
+    lines = np.asarray(shapely.linestrings(work.segments), dtype=object)
+    tree = shapely.STRtree(lines)
+    near, _ = tree.query(shapely.point_on_surface(polygons), predicate="dwithin",
+                         distance=width.max() / 2)  # fmt: skip
+    parcel, segment = tree.query(polygons, predicate="intersects")
+    inner = shapely.buffer(polygons, -snap)[parcel]
+    within = shapely.length(shapely.intersection(inner, lines[segment]))
+    through = np.bincount(parcel, weights=within, minlength=len(polygons))
+    crossed = through >= CROSSED_LENGTH * np.sqrt(shapely.area(polygons))
+    candidates = np.union1d(near, np.flatnonzero(crossed))
+    share = covered_by_streets(polygons[candidates], lines, width) / shapely.area(
+        polygons[candidates]
+    )
+    out[candidates] = (share >= STREET_SHARE) | (crossed[candidates] & (share >= CROSSED_SHARE))
+    return out
+
+
+def covered_by_streets(polygons: Geometries, lines: Geometries, width: FloatArray) -> FloatArray:
+    """(n,) area in m² of each polygon that lines of some width cover."""
+    out = np.zeros(len(polygons))
+    if not len(polygons):
+        return out
+    strips = shapely.buffer(lines, width / 2, quad_segs=4)
+    polygon, strip = shapely.STRtree(strips).query(polygons, predicate="intersects")
+    order = np.lexsort((strip, polygon))
+    found, first = np.unique(polygon[order], return_index=True)
+    groups = np.split(strips[strip[order]], first[1:])
+    covers = np.array([shapely.union_all(g) for g in groups if len(g)], dtype=object)
+    out[found] = shapely.area(shapely.intersection(polygons[found], covers))
+    return out
