@@ -10,9 +10,7 @@ import shapely
 
 from urban_processing.blocks.net import street_sides
 from urban_processing.blocks.noding import Centrelines
-from urban_processing.fabric.frontage import StreetPieces
 from urban_processing.fabric.streets_in_land import StreetsInLand
-from urban_processing.mesh.overlap import Segments
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.rights_of_way.surfaces import Circles, StreetSides, street_surfaces
 from urban_processing.site import GRID
@@ -27,7 +25,7 @@ class StreetLand:
     Parameters
     ----------
     polygons, part
-        (W,) right-of-way within each block, less parcels; and piece of the land.
+        (W,) right-of-way, less parcels, and piece of the land.
     net_area
         (F,) area of the parcels less right-of-way, m².
     """
@@ -55,76 +53,56 @@ def nominal_street_land(ground: StreetsInLand) -> Geometries:
         corner_radius=0.0,
     )
     taken = _united(surfaces.regions, surfaces.block, len(faces.polygons))
-    return _areal(shapely.intersection(faces.polygons, taken, grid_size=GRID))
+    return _areal(shapely.intersection(faces.polygons, taken))
 
 
 def gross_street_land(ground: StreetsInLand, parcels: Geometries, block: IntArray) -> StreetLand:
     """Take the nominal rights-of-way off parcels that run to the centreline."""
     taken = nominal_street_land(ground)
-    area = shapely.area(parcels)
     owner = np.flatnonzero(block >= 0)
-    lost = np.zeros(len(parcels))
-    lost[owner] = shapely.area(shapely.intersection(parcels[owner], taken[block[owner]]))
-    return _street_land(taken, ground.faces.part, area - lost)
+    net = shapely.area(parcels)
+    net[owner] -= shapely.area(shapely.intersection(parcels[owner], taken[block[owner]]))
+    polygons, of = shapely.get_parts(taken, return_index=True)
+    kept = shapely.get_dimensions(polygons) == 2
+    return StreetLand(polygons[kept], ground.faces.part[of[kept]], net)
 
 
 def net_street_land(
     ground: StreetsInLand,
-    parcels: Geometries,
+    body: shapely.Geometry,
+    area: FloatArray,
     streets: Geometries,
-    pieces: StreetPieces,
-    boundary: Segments,
+    *,
+    reach: float,
 ) -> StreetLand:
     """Return what streets take of the land that is in no parcel.
 
-    That is their nominal right-of-way, what lies between a parcel's frontage and the centreline,
-    however wide, and the parcels that are streets.
+    That is what is no further from a centreline than half its width and `reach`, as frontage may
+    be, and the parcels that are streets.
 
     Parameters
     ----------
     ground
         Streets and blocks.
-    parcels, streets
-        Parcels, and those that are streets.
-    pieces, boundary
-        Pieces of frontage, and the edges that they are on.
+    body, area
+        Union of the parcels, and (F,) their areas.
+    streets
+        Parcels that are streets.
+    reach
+        Metres.
     """
-    blocks = ground.faces.polygons
-    n = len(blocks)
-    strips = _strips(ground, pieces, boundary)
-    cover = np.concatenate([strips, streets])
-    inside, block = _pairs(cover, blocks)
-    taken = _united(
-        np.concatenate([nominal_street_land(ground), cover[inside]]),
-        np.concatenate([np.arange(n), block]),
-        n,
+    lines = ground.network.lines(ground.lines)
+    near = shapely.buffer(lines, ground.network.edge_width / 2 + reach, quad_segs=4)
+    taken = shapely.union_all(np.concatenate([near, streets]))
+    gaps = shapely.difference(shapely.union_all(ground.land), body)
+    left = shapely.get_parts(shapely.intersection(taken, gaps))
+    left = left[shapely.get_dimensions(left) == 2]
+    at, of = shapely.STRtree(ground.land).query(
+        shapely.point_on_surface(left), predicate="dwithin", distance=GRID
     )
-    parcel, block = _pairs(parcels, blocks)
-    built = _united(parcels[parcel], block, n)
-    street = _areal(shapely.intersection(blocks, taken, grid_size=GRID))
-    left = _areal(shapely.difference(street, built, grid_size=GRID))
-    return _street_land(left, ground.faces.part, shapely.area(parcels))
-
-
-def _strips(ground: StreetsInLand, pieces: StreetPieces, boundary: Segments) -> Geometries:
-    """(A,) land between each piece of frontage and its street."""
-    a, b = boundary.start[pieces.edge], boundary.end[pieces.edge]
-    p, q = a + pieces.low[:, None] * (b - a), a + pieces.high[:, None] * (b - a)
-    lines = ground.lines
-    c, d = np.moveaxis(lines.xy[lines.ends[pieces.segment]], 1, 0)
-    feet = []
-    for place in (p, q):
-        share = ((place - c) * (d - c)).sum(axis=1) / ((d - c) ** 2).sum(axis=1)
-        feet.append(c + np.clip(share, 0.0, 1.0)[:, None] * (d - c))
-    corners = np.stack([p, q, feet[1], feet[0]], axis=1)
-    strips = shapely.convex_hull(shapely.multipoints(corners))
-    return np.asarray(strips[shapely.get_dimensions(strips) == 2], dtype=object)
-
-
-def _pairs(polygons: Geometries, blocks: Geometries) -> tuple[IntArray, IntArray]:
-    block, polygon = shapely.STRtree(polygons).query(blocks, predicate="intersects")
-    order = np.lexsort((polygon, block))
-    return polygon[order], block[order]
+    part = np.zeros(len(left), dtype=np.int64)
+    part[at[::-1]] = of[::-1]
+    return StreetLand(left, part, area)
 
 
 def _united(polygons: Geometries, owner: IntArray, n: int) -> Geometries:
@@ -134,7 +112,7 @@ def _united(polygons: Geometries, owner: IntArray, n: int) -> Geometries:
     found, first = np.unique(owner[order], return_index=True)
     groups = np.split(polygons[order], first[1:])
     for k, group in zip(found.tolist(), groups, strict=False):
-        out[k] = shapely.union_all(group, grid_size=GRID)
+        out[k] = shapely.union_all(group)
     return out
 
 
@@ -146,9 +124,3 @@ def _areal(geometries: Geometries) -> Geometries:
         parts = shapely.get_parts(out[k])
         out[k] = shapely.union_all(parts[shapely.get_dimensions(parts) == 2])
     return out
-
-
-def _street_land(taken: Geometries, part: IntArray, net_area: FloatArray) -> StreetLand:
-    polygons, of = shapely.get_parts(taken, return_index=True)
-    kept = shapely.get_dimensions(polygons) == 2
-    return StreetLand(polygons[kept], part[of[kept]], net_area)

@@ -16,14 +16,11 @@ from urban_processing.site import Frame, Issue
 
 Geometries = npt.NDArray[np.object_]
 
-STREET_SHARE = 0.8
-"""A parcel with a larger share of its area in the rights-of-way is a street or a verge."""
+STREET_SHARE = 0.4
+"""A street's parcel has at least this share of its area in nominal rights-of-way."""
 
-CROSSED_SHARE = 0.4
-"""So is one with a larger share than this, if streets run through it for `CROSSED_LENGTH`."""
-
-CROSSED_LENGTH = 1.0
-"""Length of centreline within a street's parcel over the root of its area."""
+STREET_LENGTH = 1.0
+"""A street's parcel has at least this length of centreline over the root of its area."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +77,8 @@ def street_parcels(
 ) -> BoolArray:
     """(P,) which parcels are streets: cadastres have them as parcels, too.
 
-    A parcel is a street if the rights-of-way cover it but for `STREET_SHARE`, or if they cover
-    `CROSSED_SHARE` of it and centrelines run through it, further than `snap` off its boundary,
-    for `CROSSED_LENGTH`.
+    Centrelines run through it, further than `snap` off its boundary, for `STREET_LENGTH`, and the
+    rights-of-way cover `STREET_SHARE` of it.
 
     Parameters
     ----------
@@ -97,23 +93,19 @@ def street_parcels(
     if not len(work.line) or not len(polygons):
         return out
     lines = np.asarray(shapely.linestrings(work.segments), dtype=object)
-    tree = shapely.STRtree(lines)
-    near, _ = tree.query(shapely.point_on_surface(polygons), predicate="dwithin",
-                         distance=width.max() / 2)  # fmt: skip
-    parcel, segment = tree.query(polygons, predicate="intersects")
-    inner = shapely.buffer(polygons, -snap)[parcel]
-    within = shapely.length(shapely.intersection(inner, lines[segment]))
-    through = np.bincount(parcel, weights=within, minlength=len(polygons))
-    crossed = through >= CROSSED_LENGTH * np.sqrt(shapely.area(polygons))
-    candidates = np.union1d(near, np.flatnonzero(crossed))
-    share = covered_by_streets(polygons[candidates], lines, width) / shapely.area(
-        polygons[candidates]
-    )
-    out[candidates] = (share >= STREET_SHARE) | (crossed[candidates] & (share >= CROSSED_SHARE))
+    parcel, segment = shapely.STRtree(lines).query(polygons, predicate="intersects")
+    crossed, own = np.unique(parcel, return_inverse=True)
+    inner = shapely.buffer(polygons[crossed], -snap)
+    within = shapely.length(shapely.intersection(inner[own], lines[segment]))
+    through = np.bincount(own, weights=within, minlength=len(crossed))
+    area = shapely.area(polygons[crossed])
+    long = np.flatnonzero(through >= STREET_LENGTH * np.sqrt(area))
+    share = _covered(polygons[crossed[long]], lines, width) / area[long]
+    out[crossed[long[share >= STREET_SHARE]]] = True
     return out
 
 
-def covered_by_streets(polygons: Geometries, lines: Geometries, width: FloatArray) -> FloatArray:
+def _covered(polygons: Geometries, lines: Geometries, width: FloatArray) -> FloatArray:
     """(n,) area in m² of each polygon that lines of some width cover."""
     out = np.zeros(len(polygons))
     if not len(polygons):
@@ -122,7 +114,9 @@ def covered_by_streets(polygons: Geometries, lines: Geometries, width: FloatArra
     polygon, strip = shapely.STRtree(strips).query(polygons, predicate="intersects")
     order = np.lexsort((strip, polygon))
     found, first = np.unique(polygon[order], return_index=True)
-    groups = np.split(strips[strip[order]], first[1:])
-    covers = np.array([shapely.union_all(g) for g in groups if len(g)], dtype=object)
+    covers = np.array(
+        [shapely.union_all(group) for group in np.split(strips[strip[order]], first[1:])],
+        dtype=object,
+    )
     out[found] = shapely.area(shapely.intersection(polygons[found], covers))
     return out

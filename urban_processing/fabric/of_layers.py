@@ -106,6 +106,7 @@ class _Reading:
     given: Sequence[shapely.Polygon] | None
     params: MeasureParams
     issues: list[Issue] = field(default_factory=list)
+    _united: tuple[Geometries, shapely.Geometry] | None = None
 
     def fabric(self) -> Fabric:
         """Return the fabric."""
@@ -142,6 +143,15 @@ class _Reading:
             right_of_way_part=None if taken is None else taken.part,
             issues=tuple(self.issues),
         )
+
+    def _union(self, polygons: Geometries) -> shapely.Geometry:
+        """The union of parcels, kept for the next that asks for that of the same ones."""
+        if self._united is None or len(self._united[0]) != len(polygons):
+            # uniting a valid coverage is faster, and only right, where its boundaries match
+            covers = shapely.coverage_is_valid(polygons)
+            unite = shapely.coverage_union_all if covers else shapely.union_all
+            self._united = polygons, unite(polygons)
+        return self._united[1]
 
     def _centrelines(self) -> tuple[StreetLines, Centrelines]:
         """Lines near the land or the parcels with their widths, and their segments, mended."""
@@ -180,7 +190,7 @@ class _Reading:
             area = float(shapely.area(roads).sum())
             message = (
                 f"{int(found.sum())} parcel(s) are streets ({area:.0f} m²): centrelines run "
-                "through them, or they lie within rights-of-way. They count as land of streets."
+                "through them. They count as land of streets."
             )
             places = shapely.MultiPolygon(roads.tolist())
             self.issues.append(
@@ -195,13 +205,16 @@ class _Reading:
             return list(self.given)
         if parcels is not None:
             land = town_outline(
-                parcels.polygons, work, lines.width[work.line], reach=self.params.street_reach
+                parcels.polygons,
+                self._union(parcels.polygons),
+                (work, lines.width[work.line]),
+                reach=self.params.street_reach,
             )
             area = sum(polygon.area for polygon in land)
             message = (
                 f"No land was given: it is what the parcels and the streets among them cover, in "
                 f"{len(land)} piece(s), {area / 1e4:.4g} ha. Its rim is the centreline where a "
-                "street runs around the parcels; what lies within without parcels is no land."
+                "street runs around the parcels; what has neither parcels nor streets is no land."
             )
         else:
             hull = shapely.convex_hull(shapely.multilinestrings(list(work.segments)))
@@ -320,7 +333,9 @@ class _Reading:
         """The land of streets, by whether parcels run to the centreline."""
         length = (pieces.high - pieces.low) * boundary.length[pieces.edge]
         if length[pieces.on_centreline].sum() <= length.sum() / 2:
-            return net_street_land(ground, polygons, roads, pieces, boundary)
+            body = self._union(polygons)
+            reach = self.params.street_reach
+            return net_street_land(ground, body, shapely.area(polygons), roads, reach=reach)
         message = (
             "Parcels run to the centreline of streets: their net areas are less the nominal "
             "widths of these."
@@ -330,7 +345,7 @@ class _Reading:
 
     def _tell_of_parcels(self, parcels: FabricParcels) -> None:
         total = float(parcels.rings.area.sum())
-        twice = total - float(shapely.area(shapely.union_all(parcels.rings.polygons)))
+        twice = total - float(shapely.area(self._union(parcels.rings.polygons)))
         if twice > OVERLAP_SHARE * total:
             message = f"Parcels overlap: {twice:.0f} m² of them are there twice or more."
             self.issues.append(Issue("parcels_overlap", message, value=twice))

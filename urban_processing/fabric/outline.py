@@ -22,21 +22,25 @@ TOUCHES = 1e-3
 
 
 def town_outline(
-    parcels: Geometries, work: Centrelines, width: FloatArray, *, reach: float
+    parcels: Geometries,
+    body: shapely.Geometry,
+    streets: tuple[Centrelines, FloatArray],
+    *,
+    reach: float,
 ) -> tuple[shapely.Polygon, ...]:
     """Return the land that parcels and the streets among them cover.
 
     Rights-of-way and gaps between parcels are land, also where a street is wider than its nominal
     width by `reach` on both sides. Where a street runs around the parcels its centreline is the
-    rim; streets that lead away are cut where the parcels end. What else there is without parcels,
-    such as water, is no land.
+    rim; streets that lead away are cut where the parcels end. What else there is without parcels
+    and streets, such as water, is no land.
 
     Parameters
     ----------
-    parcels
-        (P,) polygons.
-    work, width
-        Segments of streets, and the width of each.
+    parcels, body
+        (P,) polygons, and their union.
+    streets
+        Segments of streets, and the (S,) width of each.
     reach
         Metres.
 
@@ -45,7 +49,7 @@ def town_outline(
     tuple of shapely.Polygon
         The largest first.
     """
-    body = shapely.union_all(parcels)
+    work, width = streets
     if not len(work.line):
         return _sorted(_closed(body, reach))
     lines = np.asarray(shapely.linestrings(work.segments), dtype=object)
@@ -64,7 +68,7 @@ def town_outline(
     edges = shapely.union_all(np.append(lines, rims), grid_size=GRID)
     cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(edges)))
     kept = _belongs(cells, parcels, core, hull)
-    return _sorted(shapely.union_all(cells[kept]))
+    return _sorted(_filled(shapely.union_all(cells[kept]), lines, reach))
 
 
 def _belongs(
@@ -83,6 +87,17 @@ def _belongs(
     at_core = _shared(cells, shapely.boundary(core))
     enclosed = at_open < TOUCHES * shapely.length(cells)
     return np.asarray(settled | (in_hull & np.where(in_core, enclosed, at_core > at_open)))
+
+
+def _filled(land: shapely.Geometry, lines: Geometries, reach: float) -> shapely.Geometry:
+    """Land with those holes filled that streets run through, such as those of interchanges."""
+    outlines, owner = shapely.get_rings(shapely.get_parts(land), return_index=True)
+    holes = shapely.polygons(outlines[np.diff(owner, prepend=-1) == 0])
+    inner = shapely.buffer(holes, -reach / 2)
+    hole, line = shapely.STRtree(lines).query(inner, predicate="intersects")
+    crossed = shapely.length(shapely.intersection(inner[hole], lines[line]))
+    total = np.bincount(hole, weights=crossed, minlength=len(holes))
+    return shapely.union_all([land, *holes[total > reach]])
 
 
 def _shared(cells: Geometries, rim: shapely.Geometry) -> FloatArray:
