@@ -7,13 +7,13 @@ import numpy.typing as npt
 import shapely
 from scipy.spatial import Voronoi
 
-STEP = 4.0
+STEP = 2.0
 """Metres between the places on the outlines of blocks that the lines keep away from."""
 
 Geometries = npt.NDArray[np.object_]
 
 
-def medial_streets(parcels: Geometries, *, gap: float = 1.5) -> Geometries:
+def medial_streets(parcels: Geometries, *, gap: float = 4.0) -> Geometries:
     """Lines between blocks: parcels that lie no further apart than `gap` metres are one block."""
     united = shapely.buffer(shapely.union_all(shapely.buffer(parcels, gap / 2)), -gap / 2)
     blocks = shapely.get_parts(united)

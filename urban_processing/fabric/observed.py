@@ -16,11 +16,13 @@ from urban_processing.site import Frame, Issue
 
 Geometries = npt.NDArray[np.object_]
 
-STREET_SHARE = 0.4
-"""A street's parcel has at least this share of its area in nominal rights-of-way."""
+STREET_SHARE, STREET_LENGTH = 0.5, 1.0
+"""A street's parcel has at least this share of its area in nominal rights-of-way, and this length
+of centreline over the root of its area."""
 
-STREET_LENGTH = 1.0
-"""A street's parcel has at least this length of centreline over the root of its area."""
+AVENUE_ROUNDNESS, AVENUE_LENGTH = 0.25, 1.5
+"""Or it is thin, that is 4π area / perimeter² at most this (rectangles of 1 : 11), and has this
+length of centreline over the root of its area: avenues are wider than their class says."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +79,8 @@ def street_parcels(
 ) -> BoolArray:
     """(P,) which parcels are streets: cadastres have them as parcels, too.
 
-    Centrelines run through it, further than `snap` off its boundary, for `STREET_LENGTH`, and the
-    rights-of-way cover `STREET_SHARE` of it.
+    Centrelines run through it, further than `snap` off its boundary, for `STREET_LENGTH` and the
+    rights-of-way cover `STREET_SHARE` of it; or it is an avenue.
 
     Parameters
     ----------
@@ -99,7 +101,10 @@ def street_parcels(
     within = shapely.length(shapely.intersection(inner[own], lines[segment]))
     through = np.bincount(own, weights=within, minlength=len(crossed))
     area = shapely.area(polygons[crossed])
-    long = np.flatnonzero(through >= STREET_LENGTH * np.sqrt(area))
+    length = through / np.sqrt(area)
+    roundness = 4.0 * np.pi * area / shapely.length(polygons[crossed]) ** 2
+    out[crossed[(length >= AVENUE_LENGTH) & (roundness <= AVENUE_ROUNDNESS)]] = True
+    long = np.flatnonzero(length >= STREET_LENGTH)
     share = _covered(polygons[crossed[long]], lines, width) / area[long]
     out[crossed[long[share >= STREET_SHARE]]] = True
     return out
