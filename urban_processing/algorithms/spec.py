@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
+from urban_processing.paths import GEOPACKAGE, MAPS
 from urban_processing.schema import Layer
 
 
@@ -61,6 +62,15 @@ class InputKind(enum.StrEnum):
     SUBDIVISION = "subdivision"
     """A subdivision made before, as a file; handed over as `Previous`."""
 
+    FABRIC = "fabric"
+    """Land with streets and parcels, of any origin, as a file; handed over as a `Fabric`. Layers
+    of parcels, streets and land stand for it, too."""
+    FABRICS = "fabrics"
+    """Several of these; handed over as `ComparedFabrics`, with what is there as one of them if
+    layers of parcels or streets, or OpenStreetMap, are given besides."""
+    OPEN_STREET_MAP = "OpenStreetMap"
+    """Streets of OpenStreetMap, from an extract or from its server."""
+
     @property
     def of_site(self) -> str:
         """Name of the argument of `read_boundary` that takes such an input; empty for others."""
@@ -69,7 +79,7 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
-        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
+        return self.chooses_crs or self in (InputKind.PARCELS_BEFORE, InputKind.FABRIC)
 
     @property
     def chooses_crs(self) -> bool:
@@ -98,11 +108,32 @@ class OutputKind(enum.StrEnum):
     """A picture of the layout or layers named in `Output.of`."""
     EXPORT = "export"
     """A folder of plain files, one for each layer of what is named in `Output.of`."""
+    REPORT = "report"
+    """A `Report`: a page of HTML with maps, tables and a glossary."""
+    JSON = "JSON"
+    """The figures of the report named in `Output.of`, as JSON."""
+    CSV = "CSV"
+    """The metrics of that report as a table."""
 
     @property
     def is_geopackage(self) -> bool:
         """Whether it is stored as one file with several layers."""
         return self in (OutputKind.LAYOUT, OutputKind.LAYERS)
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """What names of its files end in; nothing for a folder."""
+        return _ENDINGS.get(self, ())
+
+
+_ENDINGS = {
+    OutputKind.LAYOUT: (GEOPACKAGE,),
+    OutputKind.LAYERS: (GEOPACKAGE,),
+    OutputKind.MAP: MAPS,
+    OutputKind.REPORT: (".html",),
+    OutputKind.JSON: (".json",),
+    OutputKind.CSV: (".csv",),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
