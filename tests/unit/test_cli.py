@@ -100,7 +100,8 @@ def test_help_shows_every_parameter_with_unit_limits_and_default(spec: Algorithm
         if "enum" in shown:
             note += [",".join(choice for choice in shown["enum"] if choice)]
         if "exclusiveMinimum" in shown:
-            note += [f"above{shown['exclusiveMinimum']:g}"]
+            limits = f"above{shown['exclusiveMinimum']:g}"
+            note += [limits + (f",atmost{shown['maximum']:g}" if "maximum" in shown else "")]
         if "minimum" in shown and "maximum" in shown:
             note += [f"{shown['minimum']:g}to{shown['maximum']:g}"]
         elif "minimum" in shown:
