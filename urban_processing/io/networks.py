@@ -42,15 +42,24 @@ def write_sumo(layout: Layout, folder: Path) -> None:
     if not layout.edge_street.any():
         raise OutputError("The layout has no streets, and SUMO knows nothing else.")
     if layout.frame.crs:
-        with warnings.catch_warnings():
-            # SUMO asks for the old notation, which leaves out the name of the CRS
-            warnings.simplefilter("ignore", UserWarning)
-            projection = PYPROJ.from_text(layout.frame.crs).to_proj4()
-        written = sumo_documents(layout, projection=projection, lon_lat=_lon_lat(layout))
+        written = sumo_documents(
+            layout, projection=_projection(layout.frame.crs), lon_lat=_lon_lat(layout)
+        )
     else:
         written = sumo_documents(layout, projection=NO_PROJECTION)
     for name, content in zip(SUMO_FILES, written, strict=True):
         (folder / name).write_bytes(content)
+
+
+def _projection(text: str) -> str:
+    """CRS as SUMO reads it: its code, else PROJ 4's notation, which knows no shift of datum."""
+    crs = PYPROJ.from_text(text)
+    code = crs.to_authority()
+    if code is not None:
+        return ":".join(code)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # that something is lost
+        return str(crs.to_proj4())
 
 
 def _lon_lat(layout: Layout) -> FloatArray:

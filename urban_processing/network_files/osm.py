@@ -27,6 +27,7 @@ from urban_processing.network_files.tags import (
 from urban_processing.rights_of_way.lay_out import dead_ends
 from urban_processing.site import DEGREE_DIGITS
 from urban_processing.streets.network import street_network
+from urban_processing.streets.network_model import StreetNetwork
 from urban_processing.version import __version__
 
 Tags = Iterable[tuple[str, str]]
@@ -66,15 +67,15 @@ def osm_document(layout: Layout, lon_lat: FloatArray, *, parcels: bool = True) -
     )
     if used.any():
         root.append(_bounds(lon_lat[used]))
-    root.extend(_nodes(lon_lat, used, _dead_end_tags(layout)))
+    root.extend(_nodes(lon_lat, used, _dead_end_tags(layout, network)))
     root.extend(ways)
     root.extend(relations)
     return document(root)
 
 
-def _dead_end_tags(layout: Layout) -> dict[int, Tags]:
+def _dead_end_tags(layout: Layout, network: StreetNetwork) -> dict[int, Tags]:
     """Tags of the vertices where streets end."""
-    rules, network = layout.street_rules, street_network(layout)
+    rules = layout.street_rules
     has_head = rules.laid_out and rules.turning_radius > 0
     tags = tags_of(DeadEnd(2.0 * rules.turning_radius if has_head else None), DEAD_END_TAGS)
     return dict.fromkeys(network.node_vertex[dead_ends(layout, network)].tolist(), tags)

@@ -25,8 +25,6 @@ NO_PROJECTION = "!"
 DIGITS = 3
 """Digits after the point of metres."""
 
-_XSI = "http://www.w3.org/2001/XMLSchema-instance"
-_SCHEMAS = "http://sumo.dlr.de/xsd"
 _KMH = 1 / 3.6
 
 
@@ -55,7 +53,7 @@ def sumo_documents(
     layout
         The layout.
     projection
-        Its CRS as a text of PROJ.
+        Its CRS as a code or a text of PROJ.
     lon_lat
         (V, 2) longitude and latitude of the vertices of its mesh, where there is a CRS.
 
@@ -69,23 +67,17 @@ def sumo_documents(
     pieces: list[_Piece] = []
     for street, along in zip(streets_of(network), vertices_along(network, mesh), strict=True):
         pieces += _pieces(street, along, mesh, places)
-    nodes = _root("nodes")
+    nodes = ET.Element("nodes")
     nodes.append(_location(layout, projection, lon_lat))
     for vertex, name in places.items():
         node = ET.SubElement(nodes, "node", id=name, x=_metres(mesh, vertex, 0))
         node.set("y", _metres(mesh, vertex, 1))
         if vertex in fringe:
             node.set("fringe", "outer")
-    edges = _root("edges")
+    edges = ET.Element("edges")
     for piece in pieces:
         edges.extend(_both_directions(piece, mesh))
     return document(nodes), document(edges)
-
-
-def _root(name: str) -> ET.Element:
-    return ET.Element(
-        name, {"xmlns:xsi": _XSI, "xsi:noNamespaceSchemaLocation": f"{_SCHEMAS}/{name}_file.xsd"}
-    )
 
 
 def _network_nodes(network: StreetNetwork) -> tuple[dict[int, str], set[int]]:
@@ -129,7 +121,7 @@ def _location(layout: Layout, projection: str, lon_lat: FloatArray | None) -> ET
     local = _bounds(layout.mesh.xy, DIGITS)
     return ET.Element(
         "location",
-        netOffset=",".join(f"{-value:.2f}" for value in layout.frame.origin),
+        netOffset=",".join(f"{0.0 - value:.{DIGITS}f}" for value in layout.frame.origin),
         convBoundary=local,
         origBoundary=local if lon_lat is None else _bounds(lon_lat, DEGREE_DIGITS),
         projParameter=projection,
