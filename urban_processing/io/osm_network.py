@@ -60,28 +60,24 @@ def network_edges(lines: Lines) -> Lines:
         return np.empty(0, dtype=object)
     unique = np.unique(pairs.reshape(-1, 4), axis=0).reshape(-1, 2, 2)
     merged = shapely.line_merge(shapely.multilinestrings(shapely.linestrings(unique)))
-    return in_order(shapely.get_parts(merged))
-
-
-def in_order(lines: Lines) -> Lines:
-    """Lines from their lower end on, sorted by their coordinates."""
-    lines = shapely.normalize(lines)
-    keys = list(zip(shapely.bounds(lines).tolist(), shapely.to_wkb(lines).tolist(), strict=True))
+    edges = np.asarray(shapely.get_parts(shapely.normalize(merged)), dtype=object)
+    keys = [tuple(shapely.get_coordinates(edge).ravel().tolist()) for edge in edges]
     order = sorted(range(len(keys)), key=keys.__getitem__)
-    return np.asarray(lines, dtype=object)[np.array(order, dtype=np.int64)]
+    return edges[np.array(order, dtype=np.int64)]
 
 
 def reaching(edges: Lines, region: shapely.Geometry) -> Lines:
-    """Edges that come into a region, and those between two junctions of these.
+    """Edges that come into a region, and those that meet one of these.
 
-    They are left whole: a dual carriageway that was cut would no longer be closed.
+    They are left whole: a dual carriageway that was cut would no longer be closed, and one that
+    led to nothing would count as a dead end.
     """
     shapely.prepare(region)
     near = shapely.intersects(region, edges)
     _, node = np.unique(ends_of(edges).reshape(-1, 2), axis=0, return_inverse=True)
     node = node.reshape(-1, 2)
-    reached = np.isin(node, node[near]).all(axis=1)
-    return np.asarray(edges[near | reached], dtype=object)
+    reached = np.isin(node, node[near]).any(axis=1)
+    return np.asarray(edges[reached], dtype=object)
 
 
 def ends_of(edges: Lines) -> FloatArray:
@@ -91,7 +87,10 @@ def ends_of(edges: Lines) -> FloatArray:
 
 
 def cut_at(edges: Lines, parts: Sequence[shapely.Polygon], shortest: float) -> Lines:
-    """Edges within the parts of the land; ends at its boundary shorter than `shortest` vanish."""
+    """Edges within the parts of the land; ends at its boundary shorter than `shortest` vanish.
+
+    Where such an end was all that made a junction, the street goes on as one edge.
+    """
     kept = []
     for part in parts:
         rim = part.boundary
@@ -104,8 +103,7 @@ def cut_at(edges: Lines, parts: Sequence[shapely.Polygon], shortest: float) -> L
         pieces = pieces[shapely.get_type_id(pieces) == shapely.GeometryType.LINESTRING]
         stub = (shapely.length(pieces) < shortest) & shapely.dwithin(pieces, rim, ON / 1e3)
         kept += [edges[inside], pieces[~stub]]
-    lines = shapely.transform(np.concatenate(kept), snap_to_grid)
-    return in_order(lines[shapely.length(lines) > 0])
+    return network_edges(shapely.transform(np.concatenate(kept), snap_to_grid))
 
 
 def tags_along(edges: Lines, lines: Lines, tags: Tags) -> dict[str, npt.NDArray[np.object_]]:
