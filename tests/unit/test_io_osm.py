@@ -7,6 +7,7 @@ import gzip
 import json
 import os
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -212,6 +213,25 @@ def test_a_failure_of_neatnet_leaves_the_streets_as_mapped(
     assert same(observed, mapped)
     assert "as mapped" in codes(observed)["osm_not_cleaned"]
     assert "osm_cleaned" not in codes(observed)
+
+
+def test_what_neatnet_skips_or_severs_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import neatnet
+
+    def neatify(frame: Any, **options: Any) -> Any:
+        warnings.warn("The artifact has not been simplified.", UserWarning, stacklevel=1)
+        return frame[~frame.intersects(shapely.Point(ORIGIN - origin + 125).buffer(9))]
+
+    town = Town().grid(3, step=50.0).way((100.0, 100.0), (150.0, 150.0))
+    town.way((190.0, 150.0), (150.0, 150.0), (150.0, 190.0))
+    site = land(-50, -50, 220, 220)
+    origin = np.array(site.frame.origin)
+    monkeypatch.setattr(neatnet, "neatify", neatify)
+    observed = read_osm_streets(site, osm_file=town.write(tmp_path / "town.osm"))
+    assert codes(observed)["osm_places_not_cleaned"].startswith("1 place(s)")
+    assert codes(observed)["osm_severed"].startswith("1 piece(s)")
 
 
 def test_without_neatnet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

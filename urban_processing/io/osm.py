@@ -110,8 +110,9 @@ def read_osm_streets(
     streets = _chosen(ways, source, service, issues)
     lines = _local(streets, land, crs)
     edges = network_edges(lines)
+    elsewhere = BoundaryError(_elsewhere(streets, source, _bounds_around(land, crs, 0.0)))
     if not shapely.intersects(shapely.union_all(land.parts), edges).any():
-        raise BoundaryError(_elsewhere(streets, source, _bounds_around(land, crs, 0.0)))
+        raise elsewhere
     around = shapely.union_all(shapely.buffer(np.array(land.parts), CLEANED_AROUND))
     if clean:
         progress.update(0.4, "Cleaning streets")
@@ -123,7 +124,7 @@ def read_osm_streets(
     progress.update(0.9, "Cutting streets at the boundary")
     edges = cut_at(edges, land.parts, SHORTEST_END)
     if not len(edges):
-        raise BoundaryError(_elsewhere(streets, source, _bounds_around(land, crs, 0.0)))
+        raise elsewhere
     frame = _frame(edges, lines, streets, land)
     issues.append(_summary(edges))
     progress.update(1.0)
@@ -215,6 +216,12 @@ def _cleaned(ground: Lines, motorways: Lines, crs: pyproj.CRS, issues: list[Issu
     if network.skipped:
         message = f"{network.skipped} place(s) could not be simplified and are as mapped."
         issues.append(Issue("osm_places_not_cleaned", message, value=float(network.skipped)))
+    if network.severed:
+        message = (
+            f"{network.severed} piece(s) of street lost their connection where the network was "
+            "simplified, as at interchanges on several levels: look at them on the map."
+        )
+        issues.append(Issue("osm_severed", message, value=float(network.severed)))
     return network.edges
 
 

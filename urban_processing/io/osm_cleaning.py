@@ -11,7 +11,7 @@ import pyproj
 import shapely
 
 from urban_processing.errors import DependencyError
-from urban_processing.io.osm_network import Lines, ends_of, network_edges
+from urban_processing.io.osm_network import Lines, ends_of, network_edges, pieces_of
 from urban_processing.io.osm_ways import objects
 from urban_processing.site import snap_to_grid
 
@@ -51,12 +51,15 @@ class CleanedNetwork:
         Lines from one junction or dead end to the next.
     skipped
         Places that could not be simplified.
+    severed
+        Pieces of street that no longer reach the others.
     failure
         Why the whole network could not be, and is as it was; empty where it could.
     """
 
     edges: Lines
     skipped: int = 0
+    severed: int = 0
     failure: str = ""
 
 
@@ -114,7 +117,9 @@ def cleaned(streets: Lines, motorways: Lines, crs: pyproj.CRS) -> CleanedNetwork
     if failure:
         return CleanedNetwork(mapped, failure=failure)
     ground, slip_roads = _met(network_edges(lines), motorways, streets)
-    return CleanedNetwork(network_edges(np.concatenate([ground, slip_roads])), skipped=skipped)
+    edges = network_edges(np.concatenate([ground, slip_roads]))
+    severed = max(0, pieces_of(edges) - pieces_of(mapped))
+    return CleanedNetwork(edges, skipped=skipped, severed=severed)
 
 
 def _neatified(streets: Lines, crs: pyproj.CRS, many: bool) -> tuple[Lines, int, str]:

@@ -25,6 +25,9 @@ NEAR = 30.0
 ON = 1.0
 """Metres within which an edge runs where it was mapped."""
 
+AT_RIM = 1e-3
+"""Metres within which the end of a street that was cut lies on the boundary."""
+
 PARALLEL = np.cos(np.deg2rad(30.0))
 """Cosine of the angle that two streets may enclose and still run alongside each other."""
 
@@ -86,6 +89,19 @@ def ends_of(edges: Lines) -> FloatArray:
     return np.stack([shapely.get_coordinates(first), shapely.get_coordinates(last)], axis=1)
 
 
+def pieces_of(edges: Lines) -> int:
+    """Count the pieces of a network that no edge connects."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    places, node = np.unique(ends_of(edges).reshape(-1, 2), axis=0, return_inverse=True)
+    start, end = node.reshape(-1, 2).T
+    shape = (len(places), len(places))
+    graph = coo_array((np.ones(len(start)), (start, end)), shape=shape)
+    count, _ = connected_components(graph, directed=False)
+    return int(count)
+
+
 def cut_at(edges: Lines, parts: Sequence[shapely.Polygon], shortest: float) -> Lines:
     """Edges within the parts of the land; ends at its boundary shorter than `shortest` vanish.
 
@@ -101,7 +117,7 @@ def cut_at(edges: Lines, parts: Sequence[shapely.Polygon], shortest: float) -> L
         within = shapely.line_merge(shapely.intersection(crossing, part))
         pieces = shapely.get_parts(shapely.get_parts(within))
         pieces = pieces[shapely.get_type_id(pieces) == shapely.GeometryType.LINESTRING]
-        stub = (shapely.length(pieces) < shortest) & shapely.dwithin(pieces, rim, ON / 1e3)
+        stub = (shapely.length(pieces) < shortest) & shapely.dwithin(pieces, rim, AT_RIM)
         kept += [edges[inside], pieces[~stub]]
     return network_edges(shapely.transform(np.concatenate(kept), snap_to_grid))
 
