@@ -11,6 +11,7 @@ from urban_processing.mesh.planar import OUTSIDE, IntArray
 from urban_processing.metrics.parcels import measure_parcels
 from urban_processing.streets import network as net
 from urban_processing.streets.classes import NodeKind
+from urban_processing.streets.network_model import StreetNetwork
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -150,7 +151,7 @@ def street_network(layout: Layout) -> nx.MultiGraph[int]:
 
 
 def _pieces(
-    layout: Layout, network: net.StreetNetwork, is_node: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    layout: Layout, network: StreetNetwork, is_node: np.ndarray[tuple[int], np.dtype[np.bool_]]
 ) -> tuple[IntArray, IntArray, np.ndarray[tuple[int], np.dtype[np.float64]]]:
     """First and last place in `network.half_edges` of each piece between nodes; its length."""
     starts = is_node[layout.mesh.origin[network.half_edges]]

@@ -67,6 +67,8 @@ def test_metrics_do_not_change_when_the_land_is_turned(seed: int, degrees: float
     layout = layout_with_random_streets(seed, random_cells(seed))
     before, after = measure(layout), measure(rotated(layout, degrees))
     for a, b in zip(before, after, strict=True):
+        if a.metric.startswith("orientation"):  # by the points of the compass
+            continue
         tolerance = 0.02 if a.metric.startswith("thinness") else 1e-6
         assert b.value == pytest.approx(a.value, rel=tolerance, abs=1e-4, nan_ok=True), a.metric
 

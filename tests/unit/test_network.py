@@ -8,7 +8,8 @@ import shapely
 from grid_layouts import SIDE, boxes, cut_square, grid, layout_of, with_streets
 
 from urban_processing.streets.classes import NodeKind
-from urban_processing.streets.network import StreetNetwork, street_network
+from urban_processing.streets.network import street_network
+from urban_processing.streets.network_model import StreetNetwork
 
 
 def counts(net: StreetNetwork) -> tuple[int, int, int]:

@@ -9,6 +9,8 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.access_rule import reached_frontage
+from urban_processing.fabric.model import ParcelRings
+from urban_processing.fabric.of_layout import layout_rings, street_rings
 from urban_processing.layout import Layout
 from urban_processing.mesh.corners import (
     interior_angles,
@@ -89,50 +91,9 @@ class ParcelMeasures:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class ParcelRings:
-    """What F parcels are measured by, wherever they come from.
-
-    Parameters
-    ----------
-    xy, offsets
-        Ragged outer rings of the parcels, counter-clockwise, closing points left out.
-    on_street
-        (N,) length in metres of street along the edge from each vertex of the rings to the next.
-    frontage
-        (F,) length in metres of each parcel's boundary, holes and all, on streets.
-    polygons
-        (F,) the parcels as polygons.
-    area
-        (F,) their areas, m².
-    rim
-        (F,) whether an edge lies on the land's rim, a hole or an obstacle.
-    """
-
-    xy: FloatArray
-    offsets: IntArray
-    on_street: FloatArray
-    frontage: FloatArray
-    polygons: npt.NDArray[np.object_]
-    area: FloatArray
-    rim: BoolArray
-
-
 def measure_parcels(layout: Layout) -> ParcelMeasures:
     """Measure every parcel of a layout."""
-    mesh = layout.mesh
-    xy, offsets, on_street = _street_rings(layout)
-    return measure_rings(
-        ParcelRings(
-            xy=xy,
-            offsets=offsets,
-            on_street=on_street,
-            frontage=layout.frontage,
-            polygons=mesh.face_polygons(),
-            area=mesh.face_area,
-            rim=layout.rim_parcel,
-        )
-    )
+    return measure_rings(layout_rings(layout))
 
 
 def measure_rings(rings: ParcelRings) -> ParcelMeasures:
@@ -164,18 +125,18 @@ def measure_rings(rings: ParcelRings) -> ParcelMeasures:
     )
 
 
+def box_sides(polygons: npt.NDArray[np.object_]) -> FloatArray:
+    """Return the (n, 2) shorter and longer sides of the smallest rotated rectangles around."""
+    boxes = shapely.minimum_rotated_rectangle(polygons)
+    corners = shapely.get_coordinates(boxes).reshape(-1, 5, 2)[:, :3]
+    sides = np.hypot(*np.moveaxis(np.diff(corners, axis=1), 2, 0))
+    return np.asarray(np.sort(sides, axis=1))
+
+
 def width_and_depth(layout: Layout) -> tuple[FloatArray, FloatArray]:
     """Width and depth of every parcel, as `ParcelMeasures` has them, without the rest of it."""
-    xy, offsets, on_street = _street_rings(layout)
+    xy, offsets, on_street = street_rings(layout)
     return _extents(xy, offsets, _sides(xy, offsets, on_street))
-
-
-def _street_rings(layout: Layout) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Ragged rings of the parcels, and the length of street along each of their edges."""
-    mesh = layout.mesh
-    half_edges, offsets = mesh.face_rings()
-    on_street = np.where(layout.edge_street, mesh.edge_length, 0.0)[half_edges >> 1]
-    return mesh.xy[mesh.origin[half_edges]], offsets, on_street
 
 
 @dataclass(frozen=True, eq=False)

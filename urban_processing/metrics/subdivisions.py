@@ -6,13 +6,14 @@ from collections import Counter
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import ragged_rows
+from urban_processing.fabric.model import ParcelRings
 from urban_processing.layout import PARCEL_USE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.metrics.parcels import ParcelMeasures, ParcelRings, measure_rings
+from urban_processing.metrics.parcels import ParcelMeasures, box_sides, measure_rings
+from urban_processing.metrics.tables import parcel_columns
 from urban_processing.parcelling.layers import SUBDIVIDED_BLOCKS, SUBDIVIDED_PARCELS
 from urban_processing.parcelling.rules import rule_values
 from urban_processing.parcelling.subdivision import Subdivision
@@ -32,14 +33,6 @@ SUBDIVISION_KIND = "subdivision"
 
 PATIO_USE = "patio"
 """Land use of the inside of a perimeter block."""
-
-
-def box_sides(polygons: npt.NDArray[np.object_]) -> FloatArray:
-    """Return the (n, 2) shorter and longer sides of the smallest rotated rectangles around."""
-    boxes = shapely.minimum_rotated_rectangle(polygons)
-    corners = shapely.get_coordinates(boxes).reshape(-1, 5, 2)[:, :3]
-    sides = np.hypot(*np.moveaxis(np.diff(corners, axis=1), 2, 0))
-    return np.asarray(np.sort(sides, axis=1))
 
 
 class MeasuredSubdivision:
@@ -114,21 +107,10 @@ class MeasuredSubdivision:
                 "parcel_id": made.parcel_id,
                 "part": pieces.block,
                 "level": pieces.level,
-                "area_m2": p.area,
                 "net_area_m2": p.area,
-                "sides": p.sides,
-                "irregularity": p.irregularity,
-                "frontage_m": p.frontage,
-                "width_m": p.width,
-                "depth_m": p.depth,
-                "thinness": p.thinness,
-                "rim": p.rim,
+                **parcel_columns(p),
                 "land_use": np.where(pieces.patio, PATIO_USE, PARCEL_USE),
                 "locked": np.zeros(n, dtype=bool),
-                "reached": p.reached,
-                "through_lot": p.through,
-                "p_angle_deg": p.angle_deviation,
-                "p_area": p.area_ratio,
                 "lineage": [f"{v:016x}" for v in pieces.lineage.tolist()],
                 "block_id": made.blocks.block_id[pieces.block],
                 "strategy": strategy[pieces.block],

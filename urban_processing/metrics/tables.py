@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from urban_processing.fabric.of_layout import land_of_layout
 from urban_processing.layout import ON_OBSTACLE, EdgeKind, Layout
-from urban_processing.mesh.planar import OUTSIDE
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
+from urban_processing.metrics.parcels import ParcelMeasures
 from urban_processing.rights_of_way import RightsOfWay
 from urban_processing.rights_of_way.lay_out import CLASSES
 from urban_processing.schema import (
@@ -25,7 +26,9 @@ from urban_processing.schema import (
     STREETS,
     Layer,
 )
+from urban_processing.site import Frame
 from urban_processing.streets.classes import NodeKind
+from urban_processing.streets.network_model import Linework, StreetNetwork
 from urban_processing.tables import (
     Table,
     issue_table,
@@ -77,54 +80,67 @@ def parcel_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
             "parcel_id": np.arange(1, n + 1),
             "part": layout.face_part,
             "level": layout.face_level,
-            "area_m2": p.area,
             "net_area_m2": known.net_area,
-            "sides": p.sides,
-            "irregularity": p.irregularity,
-            "frontage_m": p.frontage,
-            "width_m": p.width,
-            "depth_m": p.depth,
-            "thinness": p.thinness,
-            "rim": p.rim,
+            **parcel_columns(p),
             "land_use": [layout.land_uses[i] for i in layout.face_use.tolist()],
             "locked": layout.face_locked,
-            "reached": p.reached,
-            "through_lot": p.through,
-            "p_angle_deg": p.angle_deviation,
-            "p_area": p.area_ratio,
             "lineage": [f"{v:016x}" for v in layout.face_lineage.tolist()],
         },
         layout.mesh.face_polygons(layout.frame.origin),
     )
 
 
+def parcel_columns(p: ParcelMeasures) -> dict[str, Any]:
+    """Return what the schema says of parcels by their shape and their streets, by column."""
+    return {
+        "area_m2": p.area,
+        "sides": p.sides,
+        "irregularity": p.irregularity,
+        "frontage_m": p.frontage,
+        "width_m": p.width,
+        "depth_m": p.depth,
+        "thinness": p.thinness,
+        "rim": p.rim,
+        "reached": p.reached,
+        "through_lot": p.through,
+        "p_angle_deg": p.angle_deviation,
+        "p_area": p.area_ratio,
+    }
+
+
 def street_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> Table:
     """Return one row for each network edge, rim included."""
     net = (LayoutMeasures(layout) if measures is None else measures).network
+    return make_table(STREETS, street_columns(net), net.lines(layout.mesh, layout.frame.origin))
+
+
+def street_columns(net: StreetNetwork) -> dict[str, Any]:
+    """Return what the schema says of streets, by column."""
     number = np.where(net.node_number > 0, net.node_number, np.nan)
-    return make_table(
-        STREETS,
-        {
-            "edge_id": np.arange(1, net.n_edges + 1),
-            "street_id": net.edge_street + 1,
-            "part": net.edge_part,
-            "class": net.edge_class,
-            "level": net.edge_level,
-            "width_m": net.edge_width,
-            "length_m": net.edge_length,
-            "from_junction": number[net.start],
-            "to_junction": number[net.end],
-            "fixed_id": np.where(net.edge_fixed >= 0, net.edge_fixed + 1.0, np.nan),
-        },
-        net.lines(layout.mesh, layout.frame.origin),
-    )
+    return {
+        "edge_id": np.arange(1, net.n_edges + 1),
+        "street_id": net.edge_street + 1,
+        "part": net.edge_part,
+        "class": net.edge_class,
+        "level": net.edge_level,
+        "width_m": net.edge_width,
+        "length_m": net.edge_length,
+        "from_junction": number[net.start],
+        "to_junction": number[net.end],
+        "fixed_id": np.where(net.edge_fixed >= 0, net.edge_fixed + 1.0, np.nan),
+    }
 
 
 def junction_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> Table:
     """Return one row for each junction and street end."""
     net = (LayoutMeasures(layout) if measures is None else measures).network
+    return junctions_of(net, layout.mesh, layout.frame)
+
+
+def junctions_of(net: StreetNetwork, lines: Linework, frame: Frame) -> Table:
+    """Return one row for each junction and street end of a network of lines."""
     at = np.flatnonzero(net.node_number)
-    xy = layout.mesh.xy[net.node_vertex[at]] + np.asarray(layout.frame.origin)
+    xy = lines.xy[net.node_vertex[at]] + np.asarray(frame.origin)
     return make_table(
         JUNCTIONS,
         {
@@ -139,29 +155,9 @@ def junction_table(layout: Layout, *, measures: LayoutMeasures | None = None) ->
 
 
 def boundary_table(layout: Layout) -> Table:
-    """Return the land that was laid out: one polygon for each part, holes taken off.
-
-    It is put together from the rims of the mesh, not from the parcels.
-    """
-    mesh, loops = layout.mesh, layout.mesh.loops
-    origin = np.asarray(layout.frame.origin)
-    shells: list[tuple[int, shapely.Polygon]] = []
-    holes: list[tuple[int, shapely.Polygon]] = []
-    for i in np.flatnonzero(loops.face == OUTSIDE).tolist():
-        h = loops.ring(i)[::-1]
-        part = int(layout.face_part[mesh.face[h[0] ^ 1]])
-        ring = shapely.Polygon(mesh.xy[mesh.target[h]] + origin)
-        (shells if mesh.loop_area[i] < 0 else holes).append((part, ring))
-    shells.sort(key=lambda s: (s[0], -s[1].area))
-    polygons = [_with_holes(shell, [h for q, h in holes if q == part]) for part, shell in shells]
-    return _area_table(BOUNDARY, np.array([part for part, _ in shells]), polygons)
-
-
-def _with_holes(shell: shapely.Polygon, holes: list[shapely.Polygon]) -> shapely.Polygon:
-    inside = [h for h in holes if shell.covers(h)]
-    polygon = shapely.Polygon(shell.exterior, [h.exterior for h in inside])
-    # a hole that touches the rim at a point is one loop with it
-    return polygon if polygon.is_valid else shapely.make_valid(polygon, method="structure")
+    """Return the land that was laid out: one polygon for each part, holes taken off."""
+    polygons, part = land_of_layout(layout)
+    return _area_table(BOUNDARY, part, to_map(polygons, layout.frame))
 
 
 def input_boundary_table(layout: Layout) -> Table:

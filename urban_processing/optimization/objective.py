@@ -23,7 +23,7 @@ from urban_processing.optimization.terms import (
     Term,
 )
 from urban_processing.params.optimize import Energy
-from urban_processing.streets.network import StreetNetwork
+from urban_processing.streets.network_model import StreetNetwork
 
 AREA_WEIGHT = 300.0
 """Weight of the promise that no parcel falls under the smallest area."""

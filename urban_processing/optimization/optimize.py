@@ -18,7 +18,8 @@ from urban_processing.optimization.solver import minimize
 from urban_processing.params.optimize import Energy
 from urban_processing.progress import SILENT, Progress
 from urban_processing.site import Issue
-from urban_processing.streets.network import StreetNetwork, street_network
+from urban_processing.streets.network import street_network
+from urban_processing.streets.network_model import StreetNetwork
 
 SOLVING = 0.7
 """Share of the time that solving takes; the rest is making sure of the result."""
