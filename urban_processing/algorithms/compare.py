@@ -8,20 +8,20 @@ from typing import Any
 from urban_processing.algorithms.measure import LAYERS_OF_A_FABRIC
 from urban_processing.algorithms.outputs import layer_outputs, report_outputs
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind
-from urban_processing.metrics.comparison_layers import COMPARED
+from urban_processing.fabric.comparison_layers import COMPARED
 from urban_processing.params.compare import CompareParams
 from urban_processing.progress import Progress
 
 
 def _run(inputs: Mapping[str, Any], params: CompareParams, progress: Progress) -> Mapping[str, Any]:
-    from urban_processing.metrics.comparison_layers import comparison_layers
+    from urban_processing.metrics.comparison_tables import comparison_set
     from urban_processing.pipelines.measure import compare_fabrics
     from urban_processing.report.sides import report_on
 
-    measured, comparison = compare_fabrics(inputs["layouts"], params, progress)
+    compared = compare_fabrics(inputs["layouts"], params, progress)
     return {
-        "output": comparison_layers(comparison, measured),
-        "report": report_on(measured, comparison),
+        "output": comparison_set(compared.comparison, history=compared.history),
+        "report": report_on(compared.measured, compared.comparison),
     }
 
 

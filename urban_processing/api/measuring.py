@@ -120,9 +120,7 @@ def compare(
     >>> found.comparison[["metric", "difference"]]  # doctest: +SKIP
     """
     params = CompareParams.from_values(parameters)
-    named = [
-        (names[k] if k < len(names) else "", layout) for k, layout in enumerate(layouts)
-    ]
+    named = [(names[k] if k < len(names) else "", layout) for k, layout in enumerate(layouts)]
     compared = read_compared(
         named,
         parcels=parcels,
@@ -133,4 +131,4 @@ def compare(
         params=params,
         progress=progress.slice(0.0, 0.3),
     )
-    return GeoComparison(*pipeline.compare_fabrics(compared, params, progress.slice(0.3, 1.0)))
+    return GeoComparison(pipeline.compare_fabrics(compared, params, progress.slice(0.3, 1.0)))

@@ -211,9 +211,7 @@ def _read_fabric(
         return None
     from urban_processing.io.fabrics import read_fabric
 
-    return read_fabric(
-        given[item.name], parcels=parcels, streets=streets, land=land, params=params
-    )
+    return read_fabric(given[item.name], parcels=parcels, streets=streets, land=land, params=params)
 
 
 @_collecting

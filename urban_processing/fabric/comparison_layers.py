@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urban_processing.schema import Column, ColumnType, GeometryType, Layer
+from urban_processing.schema import PROVENANCE, Column, ColumnType, GeometryType, Layer
 
 
 def _text(name: str, alias: str, description: str, *, nullable: bool = False) -> Column:
@@ -95,3 +95,8 @@ DISTANCES = Layer(
     shown=True,
 )
 """One row for each distribution and each layout but the reference."""
+
+COMPARED: tuple[Layer, ...] = (COMPARISON, DISTANCES, PROVENANCE)
+"""Layers that a comparison has."""
+
+COMPARISON_KIND = "comparison"

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 from urban_processing.io.frames import GeoLayers
-from urban_processing.metrics.comparison import Comparison
-from urban_processing.metrics.comparison_layers import comparison_layers
+from urban_processing.metrics.comparison_tables import comparison_set
 from urban_processing.metrics.fabric_layers import fabric_layers
 from urban_processing.metrics.measures import FabricMeasures
+from urban_processing.pipelines.measure import ComparedMeasures
 
 
 class GeoFabric(GeoLayers):
@@ -46,29 +44,25 @@ class GeoComparison(GeoLayers):
 
     Parameters
     ----------
-    measured
-        Measures of the sides.
-    statistics
-        The comparison.
+    compared
+        The sides that were measured, and the statistics.
     """
 
-    measured: Sequence[FabricMeasures]
-    statistics: Comparison
+    compared: ComparedMeasures
 
-    def __init__(self, measured: Sequence[FabricMeasures], statistics: Comparison) -> None:
-        super().__init__(comparison_layers(statistics, measured))
-        object.__setattr__(self, "measured", measured)
-        object.__setattr__(self, "statistics", statistics)
+    def __init__(self, compared: ComparedMeasures) -> None:
+        super().__init__(comparison_set(compared.comparison, history=compared.history))
+        object.__setattr__(self, "compared", compared)
 
     @property
     def sides(self) -> dict[str, GeoFabric]:
         """The sides by their names."""
-        return {known.fabric.name: GeoFabric(known) for known in self.measured}
+        return {known.fabric.name: GeoFabric(known) for known in self.compared.measured}
 
     def report(self, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the report as one HTML file; see `urban_processing.report.html`."""
         from urban_processing.report.html import write_report
         from urban_processing.report.sides import report_on
 
-        made: Any = report_on(self.measured, self.statistics)
+        made = report_on(self.compared.measured, self.compared.comparison)
         return write_report(made, Path(path), overwrite=overwrite)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from hashlib import sha256
 
 from urban_processing.errors import ParameterError
 from urban_processing.fabric.model import ComparedFabrics, Fabric
-from urban_processing.metrics.comparison import Comparison, Side, compare
+from urban_processing.metrics.comparison import Comparison, Side, compare, unique_names
 from urban_processing.metrics.measures import FabricMeasures
 from urban_processing.metrics.samples import samples
 from urban_processing.params.compare import CompareParams
@@ -51,23 +52,36 @@ def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) 
     return measured
 
 
-def compare_fabrics(
-    compared: ComparedFabrics, params: CompareParams, progress: Progress = SILENT
-) -> tuple[Sequence[FabricMeasures], Comparison]:
-    """Measure fabrics and set them side by side.
+@dataclass(frozen=True, eq=False)
+class ComparedMeasures:
+    """Fabrics that were measured and compared.
 
-    Returns
-    -------
+    Parameters
+    ----------
     measured
-        Measures of the fabrics, what is there last, each under a name of its own.
+        Their measures, those of what is there last, each under a name of its own.
     comparison
         The table of their metrics, and the distances of their distributions.
+    history
+        The step that made this.
+    """
+
+    measured: tuple[FabricMeasures, ...]
+    comparison: Comparison
+    history: tuple[Step, ...]
+
+
+def compare_fabrics(
+    compared: ComparedFabrics, params: CompareParams, progress: Progress = SILENT
+) -> ComparedMeasures:
+    """Measure fabrics and set them side by side.
 
     Raises
     ------
     ParameterError
         If there are fewer than two, or the reference is none of them.
     """
+    started = time.perf_counter()
     fabrics = _named(compared.all)
     if len(fabrics) < 2:
         raise ParameterError(
@@ -97,16 +111,19 @@ def compare_fabrics(
         confidence=params.confidence,
     )
     progress.update(1.0, "Compared")
-    return measured, comparison
+    digest = sha256("".join(known.fabric.input_sha256 for known in measured).encode())
+    step = Step(
+        algorithm="compare",
+        parameters=params.as_dict(),
+        seed=params.seed,
+        version=__version__,
+        input_sha256=digest.hexdigest(),
+        seconds=time.perf_counter() - started,
+    )
+    return ComparedMeasures(tuple(measured), comparison, (step,))
 
 
 def _named(fabrics: Sequence[Fabric]) -> list[Fabric]:
-    """The fabrics, those of one name numbered."""
-    names: list[str] = []
-    for fabric in fabrics:
-        plain = fabric.name or "layout"
-        name, number = plain, 2
-        while name in names:
-            name, number = f"{plain} ({number})", number + 1
-        names.append(name)
+    """The fabrics under names that differ."""
+    names = unique_names([fabric.name or "layout" for fabric in fabrics])
     return [replace(fabric, name=name) for fabric, name in zip(fabrics, names, strict=True)]
