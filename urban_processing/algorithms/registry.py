@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 
 from urban_processing.algorithms.blocks import BLOCKS
+from urban_processing.algorithms.calibrate import CALIBRATE
 from urban_processing.algorithms.cogenerate import COGENERATE
 from urban_processing.algorithms.optimize import OPTIMIZE
 from urban_processing.algorithms.spec import AlgorithmSpec
@@ -12,7 +13,7 @@ from urban_processing.algorithms.subdivide import SUBDIVIDE
 from urban_processing.algorithms.transfer import TRANSFER_SPEC
 from urban_processing.errors import ParameterError
 
-_SPECS = (COGENERATE, OPTIMIZE, BLOCKS, SUBDIVIDE, TRANSFER_SPEC)
+_SPECS = (COGENERATE, OPTIMIZE, BLOCKS, SUBDIVIDE, CALIBRATE, TRANSFER_SPEC)
 
 
 def specs() -> tuple[AlgorithmSpec, ...]:
