@@ -73,6 +73,6 @@ CALIBRATE = AlgorithmSpec(
     ),
     examples=(
         "cadastre.gpkg -o blocks.gpkg --plot observed.png",
-        "cadastre.shp -o blocks.gpkg --blocks blocks.gpkg --where \"use <> 'road'\"",
+        "cadastre.shp -o measured.gpkg --blocks blocks.gpkg --where \"use <> 'road'\"",
     ),
 )

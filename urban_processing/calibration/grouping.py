@@ -63,7 +63,7 @@ def blocks_of(parcels: ObjectArray, *, gap: float) -> tuple[ObjectArray, IntArra
         block[rows] = made + of
         made += len(own)
         pieces.append(own)
-    blocks = canonical_rings(shapely.set_precision(np.concatenate(pieces), GRID))
+    blocks = canonical_rings(_apart(shapely.set_precision(np.concatenate(pieces), GRID)))
     by_place = in_order_of_place(blocks)
     return blocks[by_place], np.argsort(by_place)[block]
 
@@ -125,6 +125,20 @@ def _without_holes(polygon: shapely.Polygon, most: float) -> shapely.Polygon:
     """Fill the holes that are no larger than `most`, an area."""
     holes = [hole for hole in polygon.interiors if shapely.Polygon(hole).area > most]
     return shapely.Polygon(polygon.exterior, holes)
+
+
+def _apart(blocks: ObjectArray) -> ObjectArray:
+    """Blocks less the smaller ones that lie in them: in a hole that was filled, or by a hair."""
+    a, b = shapely.STRtree(blocks).query(blocks, predicate="intersects")
+    smaller = np.lexsort((in_order_of_place(blocks), np.round(shapely.area(blocks), 6)))
+    rank = np.argsort(smaller)
+    a, b = a[rank[a] > rank[b]], b[rank[a] > rank[b]]
+    common = shapely.area(shapely.intersection(blocks[a], blocks[b])) > 0
+    out = blocks.copy()
+    for large, small in sorted(zip(a[common].tolist(), b[common].tolist(), strict=True)):
+        rest = shapely.get_parts(shapely.difference(out[large], blocks[small], grid_size=GRID))
+        out[large] = rest[np.argmax(shapely.area(rest))]
+    return out
 
 
 def block_of_each(parcels: ObjectArray, blocks: ObjectArray) -> IntArray:

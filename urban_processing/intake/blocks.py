@@ -120,7 +120,7 @@ def build_blocks(
     issues += [Issue(note.code, note.message, value=note.value) for note in cleaned.notes]
     issues += _unused(columns, rows, params or SubdivideParams())
     target = working_crs(
-        shapely.get_coordinates(cleaned.valid),
+        shapely.get_coordinates(cleaned.given),
         own,
         asked,
         library,

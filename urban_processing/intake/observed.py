@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,7 +15,6 @@ from urban_processing.calibration.grouping import in_order_of_place, same_as_oth
 from urban_processing.calibration.layers import BOUNDS
 from urban_processing.calibration.model import Observed
 from urban_processing.errors import BoundaryError
-from urban_processing.intake.block_values import SHAPEFILE_NAME
 from urban_processing.intake.blocks import build_blocks, local_pieces
 from urban_processing.intake.crs_choice import CrsLibrary, crs_label
 from urban_processing.intake.features import Features
@@ -87,7 +86,7 @@ def build_observed(
         raise BoundaryError(found)
     issues += [Issue(note.code, note.message, value=note.value) for note in cleaned.notes]
     target = working_crs(
-        shapely.get_coordinates(cleaned.valid),
+        shapely.get_coordinates(cleaned.given),
         own,
         asked,
         library,
@@ -194,7 +193,7 @@ def _blocks_in(
         message = f"{features.name} has no CRS; it was taken to be that of the parcels."
         issues.append(Issue("crs_missing", message))
         features = dataclasses.replace(features, crs=target)
-    kept = _without_bounds(features.columns)
+    kept = {name: values for name, values in features.columns.items() if name not in BOUNDS}
     blocks = build_blocks(
         dataclasses.replace(features, columns=kept), library=library, asked=target, carry=kept
     )
@@ -202,9 +201,3 @@ def _blocks_in(
     shift = np.subtract(blocks.frame.origin, frame.origin)
     moved = shapely.transform(blocks.polygons, lambda xy: xy + shift)
     return dataclasses.replace(blocks, polygons=np.asarray(moved), frame=frame, issues=())
-
-
-def _without_bounds(columns: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    """Columns but for those that are worked out anew, also under a name that was cut short."""
-    anew = {*BOUNDS, *(name[:SHAPEFILE_NAME] for name in BOUNDS)}
-    return {name: values for name, values in columns.items() if name not in anew}

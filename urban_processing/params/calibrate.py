@@ -42,5 +42,6 @@ class CalibrateParams(Params):
             "none out.",
             minimum=0,
             maximum=0.9,
+            advanced=True,
         ),
     ] = 0.1
