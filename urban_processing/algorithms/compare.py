@@ -45,8 +45,8 @@ COMPARE = AlgorithmSpec(
         "One side may be what is there: the streets of OpenStreetMap in the land of the first "
         "layout, from an extract or its server, or layers of parcels and streets. Dual "
         "carriageways, roundabouts and slip roads of OpenStreetMap become single lines and "
-        "junctions. Streets are cut at the boundary of the land; those of the rim of a layout count "
-        "for ways only."
+        "junctions. Streets are cut at the boundary of the land; those along the rim of a layout "
+        "count for ways only."
     ),
     params=CompareParams,
     inputs=(

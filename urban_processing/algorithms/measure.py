@@ -76,7 +76,7 @@ MEASURE = AlgorithmSpec(
         *layer_outputs(
             "what was measured",
             label="File of measures",
-            help="A GeoPackage with parcels, streets, junctions and blocks, each with its measures.",
+            help="A GeoPackage with parcels, streets, junctions, blocks and their measures.",
             layers=MEASURED,
             required=False,
         ),
