@@ -24,11 +24,8 @@ def problems(output: Output, whole: Output, given: Mapping[str, Any]) -> list[st
     if output.kind.endings:
         from urban_processing.paths import ending_problems
 
-        what = output.kind.value
-        return [
-            *ending_problems(path, what, output.kind.endings),
-            *_in_the_way(path, overwrite),
-        ]
+        wrong = ending_problems(path, output.kind.value, output.kind.endings)
+        return [*wrong, *_in_the_way(path, overwrite)]
     from urban_processing.io.exports import check_export
 
     kind = _kind(output, given)
