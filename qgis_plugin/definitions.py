@@ -74,6 +74,11 @@ _FILES = {
 sink goes to a file of its own."""
 
 
+def is_offered(spec: AlgorithmSpec) -> bool:
+    """Whether an algorithm makes layers; QGIS itself writes layers to plain files."""
+    return any(output.kind.is_geopackage for output in spec.outputs)
+
+
 @dataclass(frozen=True)
 class SinkName:
     """A sink: a layer of an output that has several."""

@@ -16,7 +16,7 @@ def _with_views(whole: Output, what: str) -> tuple[Output, ...]:
             name="export",
             kind=OutputKind.EXPORT,
             label="Plain files",
-            help="A folder for one plain file of each layer.",
+            help="A folder for plain files.",
             of=whole.name,
         ),
     )

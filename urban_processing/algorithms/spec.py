@@ -97,7 +97,8 @@ class OutputKind(enum.StrEnum):
     MAP = "map"
     """A picture of the layout or layers named in `Output.of`."""
     EXPORT = "export"
-    """A folder of plain files, one for each layer of what is named in `Output.of`."""
+    """A folder of plain files: of what is named in `Output.of`, or of the `Layout` that an
+    algorithm returns; then the algorithm has the parameters of `ExportParams`."""
 
     @property
     def is_geopackage(self) -> bool:
@@ -150,7 +151,7 @@ class Output:
         Name of the output that this one is another view of, as a map is of a layout; the
         shell makes it, the algorithm does not.
     layers
-        Layers that a layout or a set of layers can have.
+        Layers that a layout or a set of layers can have, for all but views.
     """
 
     name: str
@@ -230,9 +231,9 @@ class AlgorithmSpec:
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
         made = {output.name for output in self.outputs if not output.of}
-        bare = [o.name for o in self.outputs if o.kind.is_geopackage != bool(o.layers)]
+        bare = [o.name for o in self.outputs if bool(o.of) == bool(o.layers)]
         if bare:
-            raise ValueError(f"{self.name}: layers belong to GeoPackages: {', '.join(bare)}")
+            raise ValueError(f"{self.name}: all but views have layers: {', '.join(bare)}")
         lost = [output.name for output in self.outputs if output.of and output.of not in made]
         if lost:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")

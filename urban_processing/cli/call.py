@@ -60,7 +60,8 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
         path = given[output.name]
         if path is None:
             if output.required:
-                problems.append(f"Say where the result goes: {_flags(output)} FILE.")
+                what = "FILE" if output.kind.is_geopackage else "FOLDER"
+                problems.append(f"Say where the result goes: {_flags(output)} {what}.")
             continue
         whole = next(o for o in spec.outputs if o.name == (output.of or output.name))
         problems += stores.problems(output, whole, given)
@@ -74,4 +75,4 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
 
 
 def _flags(output: Output) -> str:
-    return "-o" if output.kind.is_geopackage else f"--{option_name(output.name)}"
+    return f"--{option_name(output.name)}" if output.of else "-o"
