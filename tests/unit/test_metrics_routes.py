@@ -216,6 +216,7 @@ def test_a_sample_of_ways_is_near_all_of_them(name: str, monkeypatch: pytest.Mon
     exact = {**Routes(fabric).parcel_values(None, interior=False)}
     exact |= Routes(fabric).network_values(None)
     monkeypatch.setattr(routes, "MOST_PAIRS", 100_000)
+    monkeypatch.setattr(routes, "MOST_NODE_PAIRS", 1)
     sampled = Routes(fabric)
     found = {**sampled.parcel_values(None, interior=False), **sampled.network_values(None)}
     factor = sampled._sources
@@ -343,3 +344,13 @@ def test_ways_do_not_depend_on_the_order_of_rows(data: st.DataObject) -> None:
                 None, interior=interior
             )
             assert other == pytest.approx(one, rel=1e-9, nan_ok=True)
+
+
+@settings(deadline=None, max_examples=10)
+@given(order=st.permutations(range(20)))
+def test_no_metric_depends_on_the_order_of_parcels(order: list[int]) -> None:
+    streets = [(0, 2), (5, 2)], [(3, 2), (3, 3), (4, 3)], [(1, 0), (1, 2)]
+    cells = boxes(5, 4)
+    one = LayoutMeasures(layout_of(cells, *streets)).of_fabric.values
+    other = LayoutMeasures(layout_of([cells[i] for i in order], *streets)).of_fabric.values
+    assert dict(other) == pytest.approx(dict(one), rel=1e-9, abs=1e-9, nan_ok=True)

@@ -17,12 +17,14 @@ from urban_processing.metrics.averages import in_part
 from urban_processing.streets.classes import NodeKind
 
 MOST_PAIRS = 8_000_000
-"""Ways are worked out between all pairs of pieces of frontage, or of nodes, if there are no more
-than these; else they begin at fewer parcels or nodes, spread evenly over the land and standing
-for the others."""
+"""Ways are worked out between all pairs of pieces of frontage, if there are no more than these;
+else they begin at fewer parcels, spread evenly over the land and standing for the others."""
+
+MOST_NODE_PAIRS = 1_000_000
+"""The same of pairs of nodes."""
 
 LEAST_SOURCES = 64
-"""But at no fewer than these."""
+"""But at no fewer parcels or nodes than these."""
 
 LEAST_IN_PART = 16
 """And at no fewer in each part of the land."""
@@ -186,7 +188,7 @@ class Routes:
         if not len(nodes):
             return sums
         xy = self.fabric.lines.xy[net.node_vertex[nodes]]
-        factor = _spread(xy, net.node_part[nodes], MOST_PAIRS // len(nodes))
+        factor = _spread(xy, net.node_part[nodes], MOST_NODE_PAIRS // len(nodes))
         source = np.flatnonzero(factor)
         step = max(1, BLOCK // net.n_nodes)
         for some in np.split(source, range(step, len(source), step)):
