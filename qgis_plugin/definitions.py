@@ -48,6 +48,8 @@ _LAYERS = {
     InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.OBSERVED_PARCELS: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.OBSERVED_BLOCKS: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,

@@ -31,6 +31,7 @@ from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
 from urban_processing.algorithms.choices import layout_problems
 from urban_processing.blocks.model import Blocks
 from urban_processing.blocks.streets import StreetsOnLand
+from urban_processing.calibration.model import Observed
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.block_values import block_columns
 from urban_processing.intake.blocks import build_blocks
@@ -38,6 +39,7 @@ from urban_processing.intake.editions import EditionLayers, build_editions
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
+from urban_processing.intake.observed import build_observed
 from urban_processing.intake.sites import build_site
 from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
 from urban_processing.layout import Layout
@@ -99,6 +101,7 @@ class Sources:
             InputKind.LAYOUT: self._layout,
             InputKind.CENTRELINES: self._streets,
             InputKind.BLOCK_LAYER: self._blocks,
+            InputKind.OBSERVED_PARCELS: self._observed,
             InputKind.SUBDIVISION: self._subdivision,
             InputKind.PARCELS_BEFORE: self._editions,
         }
@@ -161,6 +164,20 @@ class Sources:
             asked=self._asked_crs(),
             streets=None if streets is None else self._features(streets, STREET_COLUMNS),
             params=params,
+        )
+
+    def _observed(self, item: Input) -> Observed | None:
+        """Read observed parcels, and the blocks that they are in."""
+        features = self._features(item, None)
+        if features is None:
+            return None
+        self.name = self.name or features.name
+        blocks = input_of(self.algorithm.spec, InputKind.OBSERVED_BLOCKS)
+        return build_observed(
+            features,
+            library=QgisCrs(self.context.transformContext()),
+            asked=self._asked_crs(),
+            blocks=None if blocks is None else self._features(blocks, None),
         )
 
     def _subdivision(self, item: Input) -> Previous | None:

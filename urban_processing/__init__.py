@@ -16,10 +16,18 @@ from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from urban_processing import errors
-    from urban_processing.api import cogenerate, find_blocks, optimize, subdivide, transfer
+    from urban_processing.api import (
+        calibrate,
+        cogenerate,
+        find_blocks,
+        optimize,
+        subdivide,
+        transfer,
+    )
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.params.blocks import BlocksParams
+    from urban_processing.params.calibrate import CalibrateParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
     from urban_processing.params.optimize import OptimizeParams
     from urban_processing.params.rules import Preset
@@ -28,6 +36,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BlocksParams": "urban_processing.params.blocks",
+    "CalibrateParams": "urban_processing.params.calibrate",
     "CogenerateParams": "urban_processing.params.cogenerate",
     "GeoLayers": "urban_processing.io.frames",
     "GeoLayout": "urban_processing.io.frames",
@@ -37,6 +46,7 @@ _HOME = {
     "StreetPattern": "urban_processing.params.cogenerate",
     "SubdivideParams": "urban_processing.params.subdivide",
     "TransferParams": "urban_processing.params.transfer",
+    "calibrate": "urban_processing.api",
     "cogenerate": "urban_processing.api",
     "find_blocks": "urban_processing.api",
     "optimize": "urban_processing.api",
@@ -47,6 +57,7 @@ _HOME = {
 
 __all__ = [
     "BlocksParams",
+    "CalibrateParams",
     "CogenerateParams",
     "GeoLayers",
     "GeoLayout",
@@ -57,6 +68,7 @@ __all__ = [
     "SubdivideParams",
     "TransferParams",
     "__version__",
+    "calibrate",
     "cogenerate",
     "errors",
     "find_blocks",

@@ -136,6 +136,8 @@ INPUTS = {
     InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
     InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
+    InputKind.OBSERVED_PARCELS: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.OBSERVED_BLOCKS: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
 }

@@ -58,6 +58,10 @@ class InputKind(enum.StrEnum):
     """Polygons of blocks; handed over as `Blocks`."""
     BLOCK_STREETS = "lines of streets along blocks"
     """Streets that belong to a layer of blocks."""
+    OBSERVED_PARCELS = "observed parcels"
+    """Polygons of parcels as they are; handed over as `Observed`."""
+    OBSERVED_BLOCKS = "blocks of observed parcels"
+    """Polygons of the blocks of these parcels; a part of the `Observed`."""
     SUBDIVISION = "subdivision"
     """A subdivision made before, as a file; handed over as `Previous`."""
 
@@ -74,7 +78,12 @@ class InputKind(enum.StrEnum):
     @property
     def chooses_crs(self) -> bool:
         """Whether the user may choose the CRS in which such an input is worked on."""
-        return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
+        return self in (
+            InputKind.BOUNDARY,
+            InputKind.CENTRELINES,
+            InputKind.BLOCK_LAYER,
+            InputKind.OBSERVED_PARCELS,
+        )
 
 
 _OF_SITE = {

@@ -111,6 +111,7 @@ _BY_OPTION = (
     InputKind.LAND,
     InputKind.BLOCKS_BEFORE,
     InputKind.BLOCKS_AFTER,
+    InputKind.OBSERVED_BLOCKS,
 )
 """Inputs that are options; the others are arguments."""
 

@@ -175,6 +175,26 @@ def _read_blocks(
 
 
 @_collecting
+def _read_observed(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read observed parcels and the blocks that they are in."""
+    if given[item.name] is None:
+        problems.append(f"Give {option_name(item.name).upper()}, a file with polygons of parcels.")
+        return None
+    from urban_processing.io.observed import read_observed
+
+    blocks = next((given[i.name] for i in spec.inputs if i.kind is InputKind.OBSERVED_BLOCKS), None)
+    return read_observed(
+        given[item.name],
+        blocks,
+        layer=given["layer"],
+        where=given["where"],
+        crs=given["crs"],
+    )
+
+
+@_collecting
 def _read_subdivision(
     spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
 ) -> Any:
@@ -210,6 +230,7 @@ READERS: Mapping[InputKind, Reader] = {
     InputKind.LAYOUT: _read_layout,
     InputKind.CENTRELINES: _read_centrelines,
     InputKind.BLOCK_LAYER: _read_blocks,
+    InputKind.OBSERVED_PARCELS: _read_observed,
     InputKind.SUBDIVISION: _read_subdivision,
     InputKind.PARCELS_BEFORE: _read_editions,
 }
