@@ -18,6 +18,9 @@ from urban_processing.streets.network_model import Linework, StreetNetwork
 NO_BLOCK = -1
 """`FabricParcels.block` of a parcel that lies in no block."""
 
+REAL = "real"
+"""What the side of a comparison is called that is there."""
+
 UNKNOWN_LEVEL = -1
 """`FabricParcels.level` of a parcel that was not made by cuts."""
 

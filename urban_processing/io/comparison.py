@@ -9,7 +9,7 @@ from typing import Any
 
 import geopandas as gpd
 
-from urban_processing.fabric.model import ComparedFabrics, Fabric
+from urban_processing.fabric.model import REAL, ComparedFabrics, Fabric
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.fabrics import read_fabric
 from urban_processing.io.features import Source
@@ -18,8 +18,8 @@ from urban_processing.params.compare import CompareParams
 from urban_processing.progress import SILENT, Progress
 from urban_processing.site import Site
 
-REAL, OPEN_STREET_MAP = "real", "OpenStreetMap"
-"""What the side is called that is there."""
+OPEN_STREET_MAP = "OpenStreetMap"
+"""What the side is called that is there, if all of it comes from OpenStreetMap."""
 
 
 def read_compared(
