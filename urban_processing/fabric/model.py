@@ -99,7 +99,7 @@ class FabricParcels:
     net_area
         (F,) area in m² less right-of-way, NaN where no right-of-way is known.
     neighbours
-        (F,) number of other parcels with which it shares a line of its boundary.
+        (F,) number of other parcels with which it shares a line of its boundary that is no street.
     fronts
         Its frontage, piece by piece.
     """

@@ -128,7 +128,8 @@ def _inner_edges(layout: Layout) -> InnerEdges:
 
 
 def _neighbours(layout: Layout) -> IntArray:
-    sides = np.sort(layout.mesh.face.reshape(-1, 2), axis=1)
+    # across a street parcels are no neighbours, as those that stop at the right-of-way are not
+    sides = np.sort(layout.mesh.face.reshape(-1, 2)[~layout.edge_street], axis=1)
     pairs = np.unique(sides[(sides[:, 0] != OUTSIDE) & (sides[:, 0] != sides[:, 1])], axis=0)
     return np.bincount(pairs.ravel(), minlength=layout.mesh.n_faces)
 
