@@ -84,9 +84,7 @@ class Ogr:
         with _os_errors():
             file = _required(gdal.OpenEx(str(path), gdal.OF_VECTOR | gdal.OF_READONLY))
             definition = _required(file.GetLayerByName(layer)).GetLayerDefn()
-            return [
-                definition.GetFieldDefn(i).GetName() for i in range(definition.GetFieldCount())
-            ]
+            return [definition.GetFieldDefn(i).GetName() for i in range(definition.GetFieldCount())]
 
 
 OGR = Ogr()

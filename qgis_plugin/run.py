@@ -63,12 +63,12 @@ def run(
     progress.update(0.95, "Writing the results")
     results: dict[str, Any] = {}
     for name, (output, path) in destinations.files.items():
-        whole = output.of or output.name
-        if whole in products:
-            stored = products[whole]
-            (stored.write if output.kind.is_geopackage else stored.plot)(path)
+        of = output.of or output.name
+        if of in products:
+            whole = products[of]
+            (whole.write if output.kind.is_geopackage else whole.plot)(path)
         else:
-            write_report(output.kind, made[whole], path)
+            write_report(output.kind, made[of], path)
         results[name] = str(path)
     groups = {
         name: ResultGroup(_title(sources.name, spec, params), whole.history)

@@ -271,9 +271,10 @@ class AlgorithmSpec:
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
         made = {output.name for output in self.outputs if not output.of}
-        bare = [o.name for o in self.outputs if bool(o.of) == bool(o.layers)]
+        without = [bool(o.of) or o.kind is OutputKind.REPORT for o in self.outputs]
+        bare = [o.name for o, w in zip(self.outputs, without, strict=True) if w == bool(o.layers)]
         if bare:
-            raise ValueError(f"{self.name}: all but views have layers: {', '.join(bare)}")
+            raise ValueError(f"{self.name}: all but views and reports have layers: {bare}")
         lost = [output.name for output in self.outputs if output.of and output.of not in made]
         if lost:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")
