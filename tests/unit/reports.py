@@ -103,11 +103,6 @@ def undefined(side: ReportSide) -> ReportSide:
     return replace(side, values=dict.fromkeys(side.values, math.nan), samples={})
 
 
-def thirteen_wide() -> Layout:
-    """A layout with more parcels, for pictures."""
-    return grid(13, 8, [(0, 4), (13, 4)], [(4, 0), (4, 8)], [(9, 0), (9, 8)])
-
-
 @dataclass
 class Element:
     """One element of a page."""

@@ -77,6 +77,7 @@ def test_the_zip_has_one_folder_without_caches_and_binaries(
     assert {Path(name).suffix for name in texts} <= {".py", ".txt", ".svg", ".css", ".jinja", ""}
     assert not [name for name in texts if "__pycache__" in name or "/." in name]
     assert f"{TOP}/__init__.py" in texts
+    assert f"{TOP}/engine/report/html/page.html.jinja" in texts
     assert f"{TOP}/build.py" not in texts
     assert len(zipped) < 1_000_000
 

@@ -108,12 +108,18 @@ def _label(x: float, y: float, text: str, anchor: str) -> str:
 
 
 def _ticks(low: float, high: float, whole: bool) -> list[float]:
-    """Round numbers between two, ends included."""
-    step = round_up((high - low) / TICKS)
-    if whole:
-        step = max(round(step), 1)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [k * step for k in range(first, last + 1)]
+    """Round numbers between two, ends included, so many as have room."""
+    found: list[float] = []
+    for count in range(TICKS, 0, -1):
+        step = round_up((high - low) / count)
+        if whole:
+            step = max(round(step), 1)
+        first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+        found = [k * step for k in range(first, last + 1)]
+        longest = max((len(number(v, decimals_for(found))) for v in found), default=0)
+        if (longest + 1.5) * LETTER * (high - low) <= (WIDTH - LEFT - RIGHT) * step:
+            break
+    return found
 
 
 def _log_ticks(edges: FloatArray) -> list[float]:

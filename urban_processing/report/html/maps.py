@@ -25,7 +25,7 @@ from urban_processing.tables import Table
 DRAWN = ("boundary", "parcels", "blocks", "streets", "right_of_way")
 """Layers that maps are drawn of."""
 
-TALLEST_PX = 620.0
+TALLEST_PX = 700.0
 """Height of a map on a screen that is large enough."""
 
 BAR_SHARE = 0.3
@@ -166,6 +166,7 @@ class _Drawing:
         self.side = side_m * canvas.factor
         longer = max(canvas.width, canvas.height)
         self.outline = round(float(np.clip(0.03 * self.side, 0.8, longer / 500)), 1)
+        self.casing = round(float(np.clip(0.05 * self.side, 0.6, longer / 400)), 1)
         self.paths = {
             name: (line_paths if name == "streets" else area_paths)(table.shapes, canvas)
             for name, table in tables.items()
@@ -193,8 +194,7 @@ class _Drawing:
         out += [
             f'<path id="{p}-w{w}" d="{self._joined("streets", self.width == w)}"/>' for w in widths
         ]
-        casing = max(round(0.05 * self.side, 1), 0.6)
-        for kind, more in (("casing", 2 * casing), ("street", 0.0)):
+        for kind, more in (("casing", 2 * self.casing), ("street", 0.0)):
             uses = "".join(
                 f'<use href="#{p}-w{w}" stroke-width="{round(w + more, 1):g}"/>' for w in widths
             )
@@ -209,7 +209,9 @@ class _Drawing:
     def shapes(self, theme: Theme) -> str:
         """The map of a theme as SVG."""
         if theme.layer not in self.tables:
-            return f'<use href="#{self.prefix}-boundary" fill="{SURFACE}"/>'
+            p = self.prefix
+            ground = f'<use href="#{p}-boundary" fill="{SURFACE}"/>'
+            return f'{ground}<use href="#{p}-casing"/><use href="#{p}-street"/>'
         of = theme.class_of(self.tables[theme.layer])
         drawn = self._of_streets if theme.layer == "streets" else self._of_areas
         return drawn(theme, of)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.metrics.comparison import DistributionDistance
-from urban_processing.metrics.distributions import DistributionSpec, Sample
+from urban_processing.metrics.distributions import Sample
 from urban_processing.metrics.histograms import Histogram
 from urban_processing.metrics.registry import Better
 from urban_processing.report.html.digits import (
@@ -203,8 +203,3 @@ def of_distance(
         size = with_unit(abs(change), spec.unit, decimals)
         moved = f"{size} {'larger' if change > 0 else 'smaller'} in {first} than in {second}"
     return f"In the mean {moved}; the distributions differ {chance}."
-
-
-def distribution_words(spec: DistributionSpec) -> str:
-    """Return the label of a distribution with its unit."""
-    return f"{spec.label} [{spec.unit}]" if spec.unit else spec.label

@@ -90,7 +90,7 @@ def stage_of(extents: Sequence[tuple[float, float, float, float]], side: float) 
     width = max(float((boxes[:, 2] - boxes[:, 0]).max()), 1.0)
     height = max(float((boxes[:, 3] - boxes[:, 1]).max()), 1.0)
     longer = max(width, height)
-    pad = 0.02 * longer
+    pad = float(np.clip(0.5 * side, 0.02 * longer, 0.15 * longer))  # streets on the rim have width
     units = float(np.clip(PARCEL_UNITS * longer / max(side, 1e-3 * longer), FEWEST, MOST))
     return Stage(width + pad, height + pad, units / (longer + pad))
 

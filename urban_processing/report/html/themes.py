@@ -14,7 +14,7 @@ from urban_processing.layout import PARCEL_USE, REMNANT_USE
 from urban_processing.mesh.corners import IRREGULAR
 from urban_processing.metrics.land_values import PARK_USES
 from urban_processing.metrics.subdivisions import PATIO_USE
-from urban_processing.report.html.digits import counted, number, share
+from urban_processing.report.html.digits import counted, number, share, with_unit
 from urban_processing.tables import Table
 
 IntArray = npt.NDArray[np.int64]
@@ -153,8 +153,8 @@ def _frontage(parcels: Sequence[Table]) -> Theme | None:
     def sentence(table: Table) -> str:
         frontage = np.asarray(table["frontage_m"], dtype=np.float64)
         none = int((np.round(frontage, 3) <= 0.0).sum())
-        median = number(float(np.median(frontage)), 1)
-        return f"{_of(none, table)} have no frontage; the median is {median} m."
+        median = with_unit(float(np.median(frontage)), "m", 1)
+        return f"{_of(none, table)} have no frontage; the median is {median}."
 
     return Theme(
         "frontage",
@@ -182,7 +182,9 @@ def _level(parcels: Sequence[Table]) -> Theme | None:
         known = _pooled([table], "level")
         if not len(known):
             return "How many cuts made the parcels is not known."
-        return f"Parcels were made by {known.min():.0f} to {known.max():.0f} cuts."
+        fewest, most = round(known.min()), round(known.max())
+        cuts = counted(most, "cut") if fewest == most else f"{fewest} to {most} cuts"
+        return f"Parcels were made by {cuts} each."
 
     return Theme(
         "level",
@@ -246,8 +248,8 @@ def _street_classes(streets: Sequence[Table]) -> Theme | None:
         classes.append(MapClass(OTHER, LINES[-1]))
 
     def sentence(table: Table) -> str:
-        length = number(float(np.sum(table["length_m"])) / 1000, 1)
-        return f"{length} km of streets, those along the rim of the land included."
+        length = with_unit(float(np.sum(table["length_m"])) / 1000, "km", 1)
+        return f"{length} of streets, those along the rim of the land included."
 
     return Theme(
         "streets",
