@@ -17,6 +17,7 @@ from qgis.core import (
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
+    QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
     QgsProcessingParameterString,
 )
@@ -48,12 +49,20 @@ _LAYERS = {
     InputKind.LAND: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_LAYER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCK_STREETS: QgsProcessing.SourceType.TypeVectorLine,
+    InputKind.OBSERVED_PARCELS: QgsProcessing.SourceType.TypeVectorPolygon,
+    InputKind.OBSERVED_BLOCKS: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.PARCELS_BEFORE: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.PARCELS_AFTER: QgsProcessing.SourceType.TypeVectorPolygon,
     InputKind.BLOCKS_BEFORE: QgsProcessing.SourceType.TypeVectorAnyGeometry,
     InputKind.BLOCKS_AFTER: QgsProcessing.SourceType.TypeVectorAnyGeometry,
 }
 """Inputs that are layers, and their geometry."""
+
+FILES = (InputKind.LAYOUT, InputKind.SUBDIVISION, InputKind.FABRIC)
+"""Inputs that are single files."""
+
+_ELSEWHERE = (InputKind.OPEN_STREET_MAP,)
+"""Inputs that QGIS has other ways for: a layer of OpenStreetMap is one of streets."""
 
 _SINK_TYPES = {
     GeometryType.NONE: QgsProcessing.SourceType.TypeVector,
@@ -69,9 +78,17 @@ _FILES = {
     OutputKind.LAYOUT: _GEOPACKAGE,
     OutputKind.LAYERS: _GEOPACKAGE,
     OutputKind.MAP: "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)",
+    OutputKind.REPORT: "HTML (*.html)",
+    OutputKind.JSON: "JSON (*.json)",
+    OutputKind.CSV: "CSV (*.csv)",
 }
 """Outputs that are single files. An export, a folder of plain files, is none of QGIS's: each
 sink goes to a file of its own."""
+
+
+def is_offered(spec: AlgorithmSpec) -> bool:
+    """Whether an algorithm makes layers; QGIS itself writes layers to plain files."""
+    return any(output.kind.is_geopackage for output in spec.outputs)
 
 
 @dataclass(frozen=True)
@@ -126,13 +143,14 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     """
     fields = [field for panel in spec.panels().values() for field in panel]
     plain = [field for field in fields if not field.param.advanced]
-    needed = [item for item in spec.inputs if item.required]
+    inputs = [item for item in spec.inputs if item.kind not in _ELSEWHERE]
+    needed = [item for item in inputs if item.required]
     first = [field for field in plain if needed and field.param.group == plain[0].param.group]
     for item in needed:
         yield _input(item)
     for field in first:
         yield _parameter(field)
-    for item in spec.inputs:
+    for item in inputs:
         if not item.required:
             yield _input(item)
     for field in plain:
@@ -167,6 +185,11 @@ def _input(item: Input) -> QgsProcessingParameterDefinition:
         kinds = [_LAYERS[item.kind]]
         source = QgsProcessingParameterFeatureSource(name, item.label, kinds, optional=optional)
         return _helped(source, item.help + _SELECTION)
+    if item.kind is InputKind.FABRICS:
+        several = QgsProcessingParameterMultipleLayers(
+            name, item.label, QgsProcessing.SourceType.TypeFile, optional=optional
+        )
+        return _helped(several, item.help)
     file = QgsProcessingParameterFile(
         name,
         item.label,

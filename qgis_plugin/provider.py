@@ -1,4 +1,4 @@
-"""The provider: all algorithms of the registry."""
+"""The provider: all algorithms of the registry that make layers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from qgis.core import QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
 from qgis_plugin.algorithm import SpecAlgorithm
+from qgis_plugin.definitions import is_offered
 from qgis_plugin.plugin import TITLE
 from urban_processing.algorithms import AlgorithmSpec, specs
 from urban_processing.version import __version__
@@ -56,6 +57,6 @@ class UrbanProcessingProvider(QgsProcessingProvider):
         return QIcon(str(ICON))
 
     def loadAlgorithms(self) -> None:
-        """Add every algorithm."""
-        for spec in self.algorithm_specs:
+        """Add every algorithm that makes layers."""
+        for spec in filter(is_offered, self.algorithm_specs):
             self.addAlgorithm(SpecAlgorithm(spec))

@@ -9,6 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+DEGREE_DIGITS = 9
+"""Digits after the point of degrees in files: 0.1 mm, so that neighbours still fit together."""
+
 GRID = 2.0**-20
 """Spacing in metres of the grid that all coordinates are kept on, relative to a whole-metre
 origin, so that shifting to map coordinates and back loses nothing."""

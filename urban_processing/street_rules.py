@@ -125,3 +125,83 @@ VERGES = 6.0
 
 LANE_WIDTH = 3.25
 """Metres of carriageway that one of OpenStreetMap's ``lanes`` takes."""
+
+LEAST_LANE = 2.75
+"""Metres of carriageway that a lane has at least: two cars pass each other on 5.5 m (RASt 06)."""
+
+LEAST_CARRIAGEWAY = 2.0
+"""Metres that are left at least between the verges of a street, or it has none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Traffic:
+    """What a value of OpenStreetMap's ``highway`` means for traffic in a built-up area.
+
+    Parameters
+    ----------
+    speed
+        Speed in km/h: the limit, or on footpaths that of those who use them.
+    lanes
+        Lanes that such a street has at most, both directions together.
+    priority
+        Who gives way at a junction: the lower number does.
+    users
+        Whom a way is for, in the words of SUMO; empty for a street that all may use.
+    """
+
+    speed: float
+    lanes: int = 2
+    priority: int = 1
+    users: str = ""
+
+
+_WALKING, _CYCLING = "pedestrian", "pedestrian bicycle"
+
+TRAFFIC: Mapping[str, Traffic] = MappingProxyType(
+    {
+        "motorway": Traffic(speed=100, lanes=4, priority=14),
+        "trunk": Traffic(speed=80, lanes=4, priority=13),
+        "primary": Traffic(speed=50, lanes=4, priority=12),
+        "secondary": Traffic(speed=50, priority=11),
+        "tertiary": Traffic(speed=50, priority=10),
+        "motorway_link": Traffic(speed=60, priority=9),
+        "trunk_link": Traffic(speed=60, priority=8),
+        "primary_link": Traffic(speed=50, priority=7),
+        "secondary_link": Traffic(speed=50, priority=6),
+        "tertiary_link": Traffic(speed=50, priority=5),
+        "busway": Traffic(speed=50, users="bus"),
+        "unclassified": Traffic(speed=50, priority=4),
+        "residential": Traffic(speed=30, priority=3),
+        "road": Traffic(speed=50, priority=3),
+        "living_street": Traffic(speed=20, priority=2),
+        "service": Traffic(speed=20),
+        "track": Traffic(speed=20),
+        "pedestrian": Traffic(speed=5, users=_CYCLING),
+        "cycleway": Traffic(speed=20, users=_CYCLING),
+        "bridleway": Traffic(speed=10, users=_WALKING),
+        "footway": Traffic(speed=5, users=_WALKING),
+        "path": Traffic(speed=5, users=_CYCLING),
+        "steps": Traffic(speed=5, users=_WALKING),
+    }
+)
+"""Traffic by value of ``highway``. Speeds: 50 km/h is the general limit in built-up areas in most
+countries; 30 km/h is what the Stockholm Declaration on road safety (2020, resolution 11) asks for
+where people live. Priorities are those of SUMO's own table for OpenStreetMap."""
+
+HIGHWAYS: Mapping[str, str] = MappingProxyType(
+    {
+        StreetClass.RIM.value: "unclassified",
+        StreetClass.FIXED.value: "unclassified",
+        StreetClass.COLLECTOR.value: "tertiary",
+        StreetClass.LOCAL.value: "residential",
+        StreetClass.CUL_DE_SAC.value: "residential",
+        **{value: value for value in TRAFFIC},
+    }
+)
+"""Value of ``highway`` by class of a street: those of layouts, and those that are such values."""
+
+ANY_HIGHWAY = "unclassified"
+"""Value of ``highway`` of a street of any other class."""
+
+OWN_TAGS = "urban_processing:"
+"""What the keys of tags begin with that are this library's, not OpenStreetMap's."""

@@ -100,7 +100,8 @@ def test_help_shows_every_parameter_with_unit_limits_and_default(spec: Algorithm
         if "enum" in shown:
             note += [",".join(choice for choice in shown["enum"] if choice)]
         if "exclusiveMinimum" in shown:
-            note += [f"above{shown['exclusiveMinimum']:g}"]
+            limits = f"above{shown['exclusiveMinimum']:g}"
+            note += [limits + (f",atmost{shown['maximum']:g}" if "maximum" in shown else "")]
         if "minimum" in shown and "maximum" in shown:
             note += [f"{shown['minimum']:g}to{shown['maximum']:g}"]
         elif "minimum" in shown:
@@ -569,3 +570,60 @@ def test_a_spec_that_goes_on_from_a_layout_needs_no_new_code(land: Path, tmp_pat
     assert missing[1] == "Give LAYOUT, a layout file."
     wrong = ("relax", land, "-o", tmp_path / "x.gpkg", "--parcels", 1)
     assert "not a layout file" in _problems(_run(*wrong, command=command))[0]
+
+
+# ---- export ----------------------------------------------------------------------------------
+
+
+def test_export_writes_a_layout_file_in_any_format(land: Path, tmp_path: Path) -> None:
+    layout, folder = tmp_path / "layout.gpkg", tmp_path / "files"
+    assert _cogenerate(land, "-o", layout, "--parcels", 6).exit_code == 0
+    for kind, names in (
+        ("osm", {"layout.osm", "streets.osm"}),
+        ("sumo", {"layout.nod.xml", "layout.edg.xml"}),
+        (None, {"parcels.geojson", "metrics.csv"}),
+        ("parquet", {"parcels.parquet", "metrics.parquet"}),
+    ):
+        chosen = () if kind is None else ("--format", kind)
+        result = _run("export", layout, "-o", folder, *chosen)
+        assert result.exit_code == 0, result.stderr
+        assert str(folder) in result.stdout
+        assert names <= {path.name for path in folder.iterdir()}
+    again = _problems(_run("export", layout, "-o", folder, "--format", "osm"))
+    assert again[0].startswith(f"The folder {folder} already holds layout.osm, streets.osm")
+    assert _run("export", layout, "-o", folder, "--format", "osm", "--overwrite").exit_code == 0
+    # the same files as those written beside the layout
+    beside = tmp_path / "beside"
+    call = ("-o", tmp_path / "b.gpkg", "--export", beside, "--export-format", "osm")
+    assert _cogenerate(land, *call, "--parcels", 6).exit_code == 0
+    assert (beside / "layout.osm").read_bytes() == (folder / "layout.osm").read_bytes()
+
+
+def test_mistakes_of_an_export_are_told_together(land: Path, tmp_path: Path) -> None:
+    problems = _problems(_run("export", "--format", "osn", "--snap", 99))
+    assert problems == [
+        "format must be one of geojson, parquet, osm, sumo; got 'osn'.",
+        "snap must be at most 10 m; got 99.",
+        "Say where the result goes: -o FOLDER.",
+        "Give LAYOUT, a layout file, whose parcels and streets may have been edited.",
+    ]
+    missing, other = _problems(_run("export", land, "-o", tmp_path / "a" / "b"))
+    assert missing == f"The folder {tmp_path / 'a'} does not exist: create it first."
+    assert other.startswith(f"{land} is not a layout file")
+
+
+def test_formats_of_networks_are_for_layouts_alone(tmp_path: Path) -> None:
+    assert "geojson, parquet, osm, sumo;" in _words("cogenerate")
+    assert "geojson, parquet; default geojson" in _words("blocks")
+    streets = tmp_path / "streets.gpkg"
+    ring = shapely.LineString(shapely.box(0, 0, 100, 100).exterior)
+    gpd.GeoDataFrame(geometry=[ring], crs="EPSG:32630").to_file(streets)
+    call = ("-o", tmp_path / "out.gpkg", "--export", tmp_path / "x", "--export-format", "sumo")
+    assert _problems(_run("blocks", streets, *call)) == [
+        "sumo is a format of layouts, which have a network of streets: choose geojson or parquet."
+    ]
+
+
+def _words(command: str) -> str:
+    """The help page of a command without frames and line breaks."""
+    return re.sub(r"[\s│]+", " ", _run(command, "--help").stdout)

@@ -12,8 +12,19 @@ from urban_processing.algorithms.words import (
     limits_in_words,
 )
 from urban_processing.metrics.registry import METRICS
+from urban_processing.network_files.tags import DEAD_END_TAGS, PARCEL_TAGS, STREET_TAGS
 from urban_processing.params.base import ParamField
 from urban_processing.schema import LAYERS, GeometryType, Layer
+from urban_processing.street_rules import (
+    ANY_HIGHWAY,
+    HIGHWAYS,
+    LANE_WIDTH,
+    LEAST_CARRIAGEWAY,
+    LEAST_LANE,
+    OWN_TAGS,
+    TRAFFIC,
+    VERGES,
+)
 
 
 def algorithm_page(spec: AlgorithmSpec) -> str:
@@ -77,6 +88,8 @@ def _layers(output: Output) -> list[str]:
             f"## Layers of `{output.name}`",
             "All layers and columns of a layout: [layout_file.md](layout_file.md).",
         ]
+    if output.kind is OutputKind.EXPORT and not output.of:
+        return _formats()
     if output.kind is not OutputKind.LAYERS:
         return []
     parts = [
@@ -87,6 +100,50 @@ def _layers(output: Output) -> list[str]:
     for layer in output.layers:
         parts += _columns(layer, "###")
     return parts
+
+
+def _formats() -> list[str]:
+    """What stands in files of OpenStreetMap and SUMO, from the declarations that write them."""
+    own = f"Keys that begin with `{OWN_TAGS}` are this library's own; the others are in common use."
+    parts = ["## Tags in `layout.osm` and `streets.osm`", own]
+    for title, tags in (
+        ("Streets (ways)", STREET_TAGS),
+        ("Street ends inside the land (nodes)", DEAD_END_TAGS),
+        ("Parcels (closed ways, or multipolygons where there are holes)", PARCEL_TAGS),
+    ):
+        rows = [(f"`{tag.key}`", tag.meaning) for tag in tags]
+        parts += [f"### {title}", _table(("key", "value"), rows)]
+    parts += [
+        "## Classes of streets",
+        f"A class that is none of these becomes `{ANY_HIGHWAY}`; it is kept in `{OWN_TAGS}class`. "
+        f"Verges and pavements take {VERGES:g} m of the right-of-way; where less than "
+        f"{LEAST_CARRIAGEWAY:g} m are left, no carriageway is said. A lane takes at least "
+        f"{LEAST_LANE:g} m. Streets have an even number of lanes, or one that both directions "
+        "share. In SUMO each direction has half of them, of the width that the carriageway gives "
+        f"them, {LANE_WIDTH:g} m at most.",
+        _table(
+            ("class", "`highway`", "km/h", "lanes at most", "priority in SUMO", "only for"),
+            [_traffic(name, highway) for name, highway in HIGHWAYS.items()],
+        ),
+        "50 km/h is the general limit in built-up areas in most countries; 30 km/h is what the "
+        "Stockholm Declaration on road safety (2020, resolution 11) asks for where people live. "
+        "On ways with an entry in the last column the speed is that of those who use them, and "
+        "is written for SUMO alone. Priorities are those of SUMO's own table for OpenStreetMap.",
+    ]
+    return parts
+
+
+def _traffic(name: str, highway: str) -> tuple[str, ...]:
+    traffic = TRAFFIC[highway]
+    lanes = "" if traffic.users else str(traffic.lanes)
+    return (
+        f"`{name}`",
+        f"`{highway}`",
+        f"{traffic.speed:g}",
+        lanes,
+        str(traffic.priority),
+        traffic.users,
+    )
 
 
 def _columns(layer: Layer, rank: str) -> list[str]:

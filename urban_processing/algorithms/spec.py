@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
+from urban_processing.paths import GEOPACKAGE, MAPS
 from urban_processing.schema import Layer
 
 
@@ -58,8 +59,21 @@ class InputKind(enum.StrEnum):
     """Polygons of blocks; handed over as `Blocks`."""
     BLOCK_STREETS = "lines of streets along blocks"
     """Streets that belong to a layer of blocks."""
+    OBSERVED_PARCELS = "observed parcels"
+    """Polygons of parcels as they are; handed over as `Observed`."""
+    OBSERVED_BLOCKS = "blocks of observed parcels"
+    """Polygons of the blocks of these parcels; a part of the `Observed`."""
     SUBDIVISION = "subdivision"
     """A subdivision made before, as a file; handed over as `Previous`."""
+
+    FABRIC = "fabric"
+    """Land with streets and parcels, of any origin, as a file; handed over as a `Fabric`. Layers
+    of parcels, streets and land stand for it, too."""
+    FABRICS = "fabrics"
+    """Several of these; handed over as `ComparedFabrics`, with what is there as one of them if
+    layers of parcels or streets, or OpenStreetMap, are given besides."""
+    OPEN_STREET_MAP = "OpenStreetMap"
+    """Streets of OpenStreetMap, from an extract or from its server."""
 
     @property
     def of_site(self) -> str:
@@ -69,12 +83,17 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
-        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
+        return self.chooses_crs or self in (InputKind.PARCELS_BEFORE, InputKind.FABRIC)
 
     @property
     def chooses_crs(self) -> bool:
         """Whether the user may choose the CRS in which such an input is worked on."""
-        return self in (InputKind.BOUNDARY, InputKind.CENTRELINES, InputKind.BLOCK_LAYER)
+        return self in (
+            InputKind.BOUNDARY,
+            InputKind.CENTRELINES,
+            InputKind.BLOCK_LAYER,
+            InputKind.OBSERVED_PARCELS,
+        )
 
 
 _OF_SITE = {
@@ -97,12 +116,34 @@ class OutputKind(enum.StrEnum):
     MAP = "map"
     """A picture of the layout or layers named in `Output.of`."""
     EXPORT = "export"
-    """A folder of plain files, one for each layer of what is named in `Output.of`."""
+    """A folder of plain files: of what is named in `Output.of`, or of the `Layout` that an
+    algorithm returns; then the algorithm has the parameters of `ExportParams`."""
+    REPORT = "report"
+    """A `Report`: a page of HTML with maps, tables and a glossary."""
+    JSON = "JSON"
+    """The figures of the report named in `Output.of`, as JSON."""
+    CSV = "CSV"
+    """The metrics of that report as a table."""
 
     @property
     def is_geopackage(self) -> bool:
         """Whether it is stored as one file with several layers."""
         return self in (OutputKind.LAYOUT, OutputKind.LAYERS)
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """What names of its files end in; nothing for a folder."""
+        return _ENDINGS.get(self, ())
+
+
+_ENDINGS = {
+    OutputKind.LAYOUT: (GEOPACKAGE,),
+    OutputKind.LAYERS: (GEOPACKAGE,),
+    OutputKind.MAP: MAPS,
+    OutputKind.REPORT: (".html",),
+    OutputKind.JSON: (".json",),
+    OutputKind.CSV: (".csv",),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +191,7 @@ class Output:
         Name of the output that this one is another view of, as a map is of a layout; the
         shell makes it, the algorithm does not.
     layers
-        Layers that a layout or a set of layers can have.
+        Layers that a layout or a set of layers can have, for all but views.
     """
 
     name: str
@@ -230,9 +271,10 @@ class AlgorithmSpec:
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
         made = {output.name for output in self.outputs if not output.of}
-        bare = [o.name for o in self.outputs if o.kind.is_geopackage != bool(o.layers)]
+        without = [bool(o.of) or o.kind is OutputKind.REPORT for o in self.outputs]
+        bare = [o.name for o, w in zip(self.outputs, without, strict=True) if w == bool(o.layers)]
         if bare:
-            raise ValueError(f"{self.name}: layers belong to GeoPackages: {', '.join(bare)}")
+            raise ValueError(f"{self.name}: all but views and reports have layers: {bare}")
         lost = [output.name for output in self.outputs if output.of and output.of not in made]
         if lost:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")

@@ -1,4 +1,4 @@
-"""Streets to blocks, blocks to parcels, and parcels through edits, in one call each."""
+"""Streets to blocks, blocks to parcels and back, and parcels through edits, in one call each."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from urban_processing.io.editions import read_editions
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_subdivision
 from urban_processing.io.frames import GeoLayers, GeoLayout
+from urban_processing.io.observed import read_observed
 from urban_processing.layout_file.subdivisions import previous_of
 from urban_processing.metrics.subdivisions import MeasuredSubdivision
 from urban_processing.params.blocks import BlocksParams
+from urban_processing.params.calibrate import CalibrateParams
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.params.transfer import TransferParams
 from urban_processing.parcelling.reuse import Previous
 from urban_processing.pipelines import blocks as block_finding
+from urban_processing.pipelines import calibrate as calibration
 from urban_processing.pipelines import subdivide as subdivision
 from urban_processing.pipelines import transfer as persistence
 from urban_processing.processes import process_pool
@@ -161,6 +164,71 @@ def subdivide(
                 ground, params, progress, previous=before, executor=executor
             )
     return GeoLayers(MeasuredSubdivision(made).layers())
+
+
+def calibrate(
+    parcels: Source | GeoLayers,
+    blocks: Source | GeoLayers | None = None,
+    *,
+    layer: str | None = None,
+    where: str | None = None,
+    crs: object = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayers:
+    """Measure the parcels of each block, to subdivide blocks into parcels like them.
+
+    Mean and standard deviation of areas and widths give the bounds of each block (Vanegas 2012,
+    section 6); what is made can be given to `subdivide` as it is.
+
+    Parameters
+    ----------
+    parcels
+        Observed parcels: a file, GeoDataFrame, GeoSeries or shapely polygons; or what `subdivide`
+        made, which has blocks as well.
+    blocks
+        Polygons of their blocks, likewise, or what `find_blocks` made; by default parcels that
+        share sides are one block.
+    layer, where, crs
+        As in `urban_processing.io.observed.read_observed`.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `CalibrateParams`.
+
+    Returns
+    -------
+    GeoLayers
+        ``blocks`` with their bounds, ``parcels`` with their blocks and widths, and ``issues``.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong; an `UrbanError` where both layers and parameters are.
+
+    References
+    ----------
+    Vanegas, C. A. et al. (2012). Procedural generation of parcels in urban modeling. Section 6.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> parcels = [shapely.box(x, 0, x + 10, y) for x, y in ((0, 30), (10, 40), (20, 20))]
+    >>> found = calibrate(parcels)
+    >>> found.blocks[["area_mean_m2", "min_area", "max_area"]].round(1).values.tolist()
+    [[300.0, 136.7, 463.3]]
+    """
+    if isinstance(parcels, GeoLayers):
+        if blocks is None and BLOCKS.name in parcels.made.names:
+            blocks = parcels
+        parcels = _layer_of(parcels, PARCELS.name)
+    if isinstance(blocks, GeoLayers):
+        blocks = _without_nan(_layer_of(blocks, BLOCKS.name))
+    params, observed = gathered(
+        lambda: CalibrateParams.from_values(parameters),
+        lambda: read_observed(parcels, blocks, layer=layer, where=where, crs=crs),
+    )
+    return GeoLayers(calibration.calibrate(observed, params, progress))
 
 
 def transfer(

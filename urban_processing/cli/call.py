@@ -9,7 +9,7 @@ from typing import Any
 
 from urban_processing.algorithms.spec import AlgorithmSpec, Output
 from urban_processing.cli import stores
-from urban_processing.cli.readers import READERS, values_given
+from urban_processing.cli.readers import READERS, named_file, values_given
 from urban_processing.errors import UrbanError
 from urban_processing.params.base import Params, option_name
 
@@ -52,15 +52,16 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
 def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]:
     problems: list[str] = []
     taken = {
-        Path(given[item.name]).resolve(): f"the input {given[item.name]}"
+        Path(path).resolve(): f"the input {path}"
         for item in spec.inputs
-        if given[item.name] is not None
+        for path in _paths(given[item.name])
     }
     for output in spec.outputs:
         path = given[output.name]
         if path is None:
             if output.required:
-                problems.append(f"Say where the result goes: {_flags(output)} FILE.")
+                what = "FILE" if output.kind.is_geopackage else "FOLDER"
+                problems.append(f"Say where the result goes: {_flags(output)} {what}.")
             continue
         whole = next(o for o in spec.outputs if o.name == (output.of or output.name))
         problems += stores.problems(output, whole, given)
@@ -73,5 +74,14 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
     return problems
 
 
+def _paths(given: Any) -> tuple[str, ...]:
+    """Files that were given for an input, names of sides taken off."""
+    if given is None:
+        return ()
+    if isinstance(given, tuple):
+        return tuple(named_file(text)[1] for text in given)
+    return (given,)
+
+
 def _flags(output: Output) -> str:
-    return "-o" if output.kind.is_geopackage else f"--{option_name(output.name)}"
+    return f"--{option_name(output.name)}" if output.of else "-o"

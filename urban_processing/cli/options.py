@@ -11,6 +11,7 @@ import click
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind, Output, OutputKind
 from urban_processing.algorithms.words import column_in_words, default_in_words, limits_in_words
 from urban_processing.params.base import ParamField, option_name
+from urban_processing.params.export import ExportKind, ExportParams
 
 INPUT, OUTPUT, OTHER = "Input", "Output", "Options"
 """Panels of the help page."""
@@ -34,8 +35,9 @@ def command_parameters(spec: AlgorithmSpec) -> list[click.Parameter]:
     parameters: list[click.Parameter] = []
     for item in spec.inputs:
         parameters += _input_parameters(item)
+    of_layout = any(output.kind is OutputKind.LAYOUT for output in spec.outputs)
     for output in spec.outputs:
-        parameters += _output_options(output)
+        parameters += _output_options(output, of_layout=of_layout)
     parameters += _writing_options(spec)
     for panel, fields in spec.panels().items():
         parameters += [parameter_option(field, panel) for field in fields]
@@ -109,6 +111,7 @@ _BY_OPTION = (
     InputKind.LAND,
     InputKind.BLOCKS_BEFORE,
     InputKind.BLOCKS_AFTER,
+    InputKind.OBSERVED_BLOCKS,
 )
 """Inputs that are options; the others are arguments."""
 
@@ -116,10 +119,18 @@ _BY_OPTION = (
 def _input_parameters(item: Input) -> list[click.Parameter]:
     if item.kind.of_site or item.kind in _BY_OPTION:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
+    if item.kind is InputKind.OPEN_STREET_MAP:
+        fetch = "Fetch it from OpenStreetMap's server, within the land; kept for the next time."
+        return [
+            _file(f"--{option_name(item.name)}", panel=INPUT, help=item.help),
+            _option("--osm", is_flag=True, panel=INPUT, help=fetch),
+        ]
+    several = item.kind is InputKind.FABRICS
     argument = HelpArgument(
         [item.name],
         required=False,
         type=click.Path(),
+        nargs=-1 if several else 1,
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
@@ -168,22 +179,28 @@ def _writing_options(spec: AlgorithmSpec) -> list[click.Parameter]:
     return options
 
 
-def _output_options(output: Output) -> list[click.Parameter]:
+def _output_options(output: Output, *, of_layout: bool) -> list[click.Parameter]:
     flag = f"--{option_name(output.name)}"
     if output.kind.is_geopackage:
         return [_file("-o", flag, panel=OUTPUT, help=output.help, note=".gpkg")]
-    if output.kind is OutputKind.MAP:
-        return [_file(flag, panel=OUTPUT, help=output.help, note=".png, .svg or .pdf")]
-    formats = ("geojson", "parquet")
+    if output.kind.endings:
+        *others, last = output.kind.endings
+        note = f"{', '.join(others)} or {last}" if others else last
+        return [_file(flag, panel=OUTPUT, help=output.help, note=note)]
+    folder = {"metavar": "FOLDER", "panel": OUTPUT, "help": output.help}
+    if not output.of:  # the format is a parameter of the algorithm
+        return [_file("-o", flag, **folder)]
+    field = next(field for field in ExportParams.fields() if field.kind is ExportKind)
+    formats = [kind.value for kind in ExportKind if of_layout or not kind.of_layouts]
     return [
-        _file(flag, metavar="FOLDER", panel=OUTPUT, help=output.help),
+        _file(flag, **folder),
         _option(
             f"{flag}-format",
             shell_complete=_completing(*formats),
             metavar="CHOICE",
-            default=formats[0],
+            default=default_in_words(field),
             panel=OUTPUT,
-            help="Format of these files; GeoJSON is in WGS 84.",
-            note=f"{', '.join(formats)}; default {formats[0]}",
+            help=field.param.help,
+            note=f"{', '.join(formats)}; default {default_in_words(field)}",
         ),
     ]

@@ -8,6 +8,7 @@ from typing import Any
 
 from urban_processing.algorithms.spec import Output, OutputKind
 from urban_processing.errors import ParameterError
+from urban_processing.params.export import ExportParams
 
 
 def problems(output: Output, whole: Output, given: Mapping[str, Any]) -> list[str]:
@@ -20,18 +21,19 @@ def problems(output: Output, whole: Output, given: Mapping[str, Any]) -> list[st
         from urban_processing.layout_file.writing import check_output
 
         return check_output(path, overwrite=overwrite)
-    if output.kind is OutputKind.MAP:
-        from urban_processing.paths import map_problems
+    if output.kind.endings:
+        from urban_processing.paths import ending_problems
 
-        return [*map_problems(path), *_in_the_way(path, overwrite)]
+        wrong = ending_problems(path, output.kind.value, output.kind.endings)
+        return [*wrong, *_in_the_way(path, overwrite)]
     from urban_processing.io.exports import check_export
 
+    kind = _kind(output, given)
     try:
-        return check_export(
-            path, kind=given[_format(output)], overwrite=overwrite, layers=whole.layers
-        )
+        return check_export(path, kind=kind, overwrite=overwrite, layers=whole.layers)
     except ParameterError as error:
-        return list(error.problems)
+        # a parameter is checked with the others
+        return list(error.problems) if output.of else []
 
 
 def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
@@ -48,13 +50,26 @@ def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
     if output.kind is OutputKind.MAP:
         _plot(made, path)
         return path
+    if output.kind in (OutputKind.REPORT, OutputKind.JSON, OutputKind.CSV):
+        return _write_report(output, made, path, overwrite=overwrite)
     from urban_processing.io.exports import export_layers, export_layout
     from urban_processing.tables import LayerSet
 
-    how = {"kind": given[_format(output)], "overwrite": overwrite}
+    how = {"kind": _kind(output, given), "overwrite": overwrite}
     if isinstance(made, LayerSet):
         return export_layers(made.layers(), path, crs=made.frame.crs, **how)
     return export_layout(made, path, **how)
+
+
+def _write_report(output: Output, made: Any, path: Path, *, overwrite: bool) -> Path:
+    from urban_processing.report.html import write_csv, write_json, write_report
+
+    writers = {
+        OutputKind.REPORT: write_report,
+        OutputKind.JSON: write_json,
+        OutputKind.CSV: write_csv,
+    }
+    return writers[output.kind](made, path, overwrite=overwrite)
 
 
 def _plot(made: Any, path: Path) -> None:
@@ -70,8 +85,10 @@ def _plot(made: Any, path: Path) -> None:
         plot_layout(made, path)
 
 
-def _format(output: Output) -> str:
-    return f"{output.name}_format"
+def _kind(output: Output, given: Mapping[str, Any]) -> str:
+    """Format of plain files: of a view an option of its own, else a parameter."""
+    name = f"{output.name}_format" if output.of else "format"
+    return str(given[name] or ExportParams.format)
 
 
 def _in_the_way(path: Path, overwrite: bool) -> list[str]:

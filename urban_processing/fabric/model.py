@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.provenance import Step
 from urban_processing.site import Frame, Issue
@@ -16,6 +17,9 @@ from urban_processing.streets.network_model import Linework, StreetNetwork
 
 NO_BLOCK = -1
 """`FabricParcels.block` of a parcel that lies in no block."""
+
+REAL = "real"
+"""What the side of a comparison is called that is there."""
 
 UNKNOWN_LEVEL = -1
 """`FabricParcels.level` of a parcel that was not made by cuts."""
@@ -181,6 +185,10 @@ class Fabric:
         Steps that made it, oldest first; none for what was found.
     input_sha256
         Hash of the input, for provenance.
+    name
+        What it is called, such as the stem of its file.
+    layout
+        The layout that it is; None where it was found.
     """
 
     frame: Frame
@@ -198,8 +206,31 @@ class Fabric:
     issues: tuple[Issue, ...] = ()
     history: tuple[Step, ...] = ()
     input_sha256: str = ""
+    name: str = ""
+    layout: Layout | None = None
 
     @cached_property
     def street_lines(self) -> Geometries:
         """(K,) the network edges as lines in local metres."""
         return self.network.lines(self.lines)
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedFabrics:
+    """What is compared with each other.
+
+    Parameters
+    ----------
+    made
+        Fabrics in the order in which they were given.
+    real
+        What is there, if it is one of those compared.
+    """
+
+    made: tuple[Fabric, ...]
+    real: Fabric | None = None
+
+    @property
+    def all(self) -> tuple[Fabric, ...]:
+        """All fabrics, what is there last."""
+        return self.made if self.real is None else (*self.made, self.real)

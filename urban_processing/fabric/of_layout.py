@@ -69,6 +69,8 @@ def fabric_of_layout(
         net_min_area=layout.street_rules.net_min_area,
         issues=layout.issues,
         history=layout.history,
+        input_sha256=layout.digest,
+        layout=layout,
     )
 
 

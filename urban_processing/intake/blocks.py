@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -67,6 +67,7 @@ def build_blocks(
     streets: Features[C] | None = None,
     params: SubdivideParams | None = None,
     snap: float = 1.0,
+    carry: Collection[str] = (),
     problems: Sequence[str] = (),
 ) -> Blocks:
     """Make a layer of blocks ready for subdivision.
@@ -94,6 +95,8 @@ def build_blocks(
         What holds where no column says otherwise: bounds are checked against it.
     snap
         Metres.
+    carry
+        Names of other columns to be carried along as they are.
     problems
         What is wrong already: raised with all else that is.
 
@@ -118,7 +121,7 @@ def build_blocks(
     issues += [Issue(note.code, note.message, value=note.value) for note in cleaned.notes]
     issues += _unused(columns, rows, params or SubdivideParams())
     target = working_crs(
-        shapely.get_coordinates(cleaned.valid),
+        shapely.get_coordinates(cleaned.given),
         own,
         asked,
         library,
@@ -127,11 +130,12 @@ def build_blocks(
         result="the parcels are",
     )
     projection = Projection(own, target, library)
-    polygons, row, origin = _local(cleaned, projection, features.name)
+    polygons, row, origin = local_pieces(cleaned, projection, features.name)
     frame = Frame("" if target is None else library.text(target), origin)
     polygons, row = _without_overlaps(polygons, row, given_id, issues)
     block_id, order = _numbered(polygons, row, given_id, issues)
     row = row[order]
+    columns = {name: features.columns[name] for name in carry if name in features.columns} | columns
     blocks = plain_blocks(
         polygons[order],
         frame=frame,
@@ -197,15 +201,30 @@ def _block_ids(features: Features[Any], rows: IntArray) -> tuple[IntArray | None
     return out, [f"Numbers of blocks are there twice: {BLOCK_ID} {named}, in row {named_rows(at)}."]
 
 
-def _local(
-    cleaned: CleanedEach, projection: Projection[Any], name: str
+def local_pieces(
+    cleaned: CleanedEach, projection: Projection[Any], name: str, *, what: str = "blocks"
 ) -> tuple[ObjectArray, IntArray, tuple[float, float]]:
-    """Single polygons on the grid in local metres, the row of each, and the origin."""
+    """Single polygons on the grid in local metres, the row of each, and the origin.
+
+    Parameters
+    ----------
+    cleaned
+        Polygons in the source's coordinates.
+    projection
+        To the CRS to work in.
+    name, what
+        What the layer, and what is in it, is called in sentences.
+
+    Raises
+    ------
+    BoundaryError
+        If some coordinates have no place in that CRS, or no polygon has an area.
+    """
     mapped = projection.geometries(cleaned.valid)
     if not np.isfinite(shapely.get_coordinates(mapped)).all():
         raise BoundaryError(
             f"{name}: some coordinates have no place in the CRS asked for: choose one that covers "
-            "the blocks, or leave crs (--crs) out."
+            f"the {what}, or leave crs (--crs) out."
         )
     if not len(shapely.get_coordinates(mapped)):
         raise BoundaryError(f"{name}: its polygons have no area.")

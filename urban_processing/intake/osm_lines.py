@@ -1,7 +1,9 @@
-"""Which lines of OpenStreetMap are streets, where a layer has others, too."""
+"""Lines of OpenStreetMap: their tags, and which are streets where a layer has others, too."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -12,11 +14,48 @@ from urban_processing.intake.features import Features
 from urban_processing.intake.given import CLASS_COLUMNS, WIDTH_COLUMNS, text
 from urban_processing.intake.tag_values import length_of
 from urban_processing.site import Issue
-from urban_processing.street_rules import OSM_KEYS
+from urban_processing.street_rules import OSM_KEYS, OWN_TAGS
 
 C = TypeVar("C")
 
 HIGHWAY = "highway"
+OTHER_TAGS = "other_tags"
+"""Column in which GDAL keeps all tags of a line that have no column of their own."""
+
+_TAG = re.compile(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"')
+_ESCAPED = re.compile(r"\\(.)")
+
+
+_OWN_COLUMNS = {OWN_TAGS + name: name for name in (CLASS_COLUMNS[0], WIDTH_COLUMNS[0])}
+"""Columns of the tags that are this library's own."""
+
+
+def with_tags(features: Features[C], keys: Sequence[str]) -> Features[C]:
+    """Give those tags columns that GDAL keeps in one, ``other_tags``.
+
+    What a column of that name says already stays.
+
+    Parameters
+    ----------
+    features
+        Lines.
+    keys
+        Keys of OpenStreetMap that are of use; those of this library's own tags are known.
+    """
+    if OTHER_TAGS not in features.columns:
+        return features
+    n, wanted = len(features.geometry), {key: key for key in keys} | _OWN_COLUMNS
+    found: dict[str, npt.NDArray[Any]] = {}
+    for row, tags in enumerate(features.columns[OTHER_TAGS]):
+        for key, value in _TAG.findall(tags) if isinstance(tags, str) else ():
+            if key not in wanted:
+                continue
+            name = wanted[key]
+            if name not in found:
+                found[name] = np.array(features.columns.get(name, np.full(n, None)), dtype=object)
+            if text(found[name][row]) == "":
+                found[name][row] = _ESCAPED.sub(r"\1", value)
+    return replace(features, columns={**features.columns, **found})
 
 
 def without_other_lines(features: Features[C], issues: list[Issue]) -> Features[C]:

@@ -24,7 +24,7 @@ from urban_processing.intake.given import (
     text,
     wrong_kind,
 )
-from urban_processing.intake.osm_lines import HIGHWAY, without_other_lines
+from urban_processing.intake.osm_lines import HIGHWAY, with_tags, without_other_lines
 from urban_processing.intake.projection import Projection
 from urban_processing.intake.sites import build_site
 from urban_processing.intake.tag_values import length_of, values_of
@@ -52,6 +52,9 @@ STREET_COLUMNS = (
     *OSM_KEYS,
 )
 """Attributes of centrelines that are looked for."""
+
+TAGS = (WIDTH_COLUMNS[1], LANES, *OFF_GROUND)
+"""Tags of OpenStreetMap that are looked for where a layer keeps several in one column."""
 
 MAX_NAMED = 5
 """Rows that a sentence names before it says how many more there are."""
@@ -103,7 +106,7 @@ def build_streets(
     own = source_crs(features, asked, library, found, issues)
     if found:
         raise BoundaryError(found)
-    features = without_other_lines(features, issues)
+    features = without_other_lines(with_tags(features, TAGS), issues)
     lines, row = _lines(features)
     target = working_crs(
         shapely.get_coordinates(lines),
@@ -161,7 +164,7 @@ def street_lines_in(features: Features[C], projection: Projection[C], frame: Fra
     if problems:
         raise BoundaryError(problems)
     issues: list[Issue] = []
-    features = without_other_lines(features, issues)
+    features = without_other_lines(with_tags(features, TAGS), issues)
     lines, row = _lines(features)
     mapped = projection.of(features).geometries(lines)
     _must_be_finite(mapped, features.name)

@@ -1,10 +1,9 @@
-"""Plain exports of a layout: one file for each layer, for programs that want no GeoPackage."""
+"""Plain exports, for programs that want no GeoPackage: files of each layer, or networks."""
 
 from __future__ import annotations
 
-import enum
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 
@@ -14,23 +13,22 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from urban_processing.errors import DependencyError, OutputError, ParameterError
 from urban_processing.io.frames import table_frame
+from urban_processing.io.networks import OSM_FILES, SUMO_FILES, write_osm, write_sumo
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import as_written
 from urban_processing.layout_file.geopackage import field_arrays
 from urban_processing.metrics.tables import layout_tables
+from urban_processing.params.export import ExportKind
 from urban_processing.paths import folder_problems
-from urban_processing.schema import LAYERS, GeometryType, Layer, layer
+from urban_processing.schema import LAYERS, STREETS, GeometryType, Layer, layer
+from urban_processing.site import DEGREE_DIGITS
 from urban_processing.tables import Table
 
-COORDINATE_DIGITS = "9"
-"""Digits after the point of degrees: 0.1 mm, so that neighbours still fit together."""
+_IN_WGS84 = {ExportKind.GEOJSON: "GeoJSON", ExportKind.OSM: "OpenStreetMap"}
+"""Formats that have no other CRS, and what to call them."""
 
-
-class ExportKind(enum.StrEnum):
-    """Format of an export: GeoJSON in WGS 84 (RFC 7946), or GeoParquet in the layout's CRS."""
-
-    GEOJSON = "geojson"
-    PARQUET = "parquet"
+_NETWORKS = {ExportKind.OSM: (write_osm, OSM_FILES), ExportKind.SUMO: (write_sumo, SUMO_FILES)}
+"""What writes the formats of networks, and the files that it makes."""
 
 
 def export_layout(
@@ -40,10 +38,40 @@ def export_layout(
     kind: str = ExportKind.GEOJSON,
     overwrite: bool = False,
 ) -> Path:
-    """Write every layer of a layout as a file of its own; see `export_layers`."""
-    tables = layout_tables(as_written(layout))
-    layers = {layer(name): table for name, table in tables.items()}
-    return export_layers(layers, folder, crs=layout.frame.crs, kind=kind, overwrite=overwrite)
+    """Write a layout as plain files: its layers, or its network of streets.
+
+    Parameters
+    ----------
+    layout
+        The layout.
+    folder
+        Folder for the files; made if its parent exists.
+    kind
+        An `ExportKind`. OpenStreetMap's is ``layout.osm``, with streets and parcels, and
+        ``streets.osm``, with streets alone; SUMO's is ``layout.nod.xml`` and ``layout.edg.xml``.
+    overwrite
+        Whether existing files may be replaced.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    OutputError
+        If files cannot be written there, the format is in WGS 84 and there is no CRS, or there are
+        no streets for SUMO.
+    ParameterError
+        If `kind` is no `ExportKind`.
+    """
+    crs, written = layout.frame.crs, as_written(layout)
+    if kind in _NETWORKS:
+        target = _checked(folder, LAYERS, crs=crs, kind=kind, overwrite=overwrite)
+        write, _ = _NETWORKS[ExportKind(kind)]
+        return _put(target, lambda temporary: write(written, temporary))
+    layers = {layer(name): table for name, table in layout_tables(written).items()}
+    return export_layers(layers, folder, crs=crs, kind=kind, overwrite=overwrite)
 
 
 def export_layers(
@@ -81,19 +109,40 @@ def export_layers(
     OutputError
         If files cannot be written there, or GeoJSON is asked for and there is no CRS.
     """
-    target = Path(folder)
-    problems = check_export(target, kind=kind, overwrite=overwrite, layers=layers)
-    chosen = ExportKind(kind)
-    if chosen is ExportKind.GEOJSON and not crs:
-        problems.append("GeoJSON is in WGS 84, but the layout has no CRS: give its boundary one.")
+    target = _checked(folder, layers, crs=crs, kind=kind, overwrite=overwrite)
+    if kind in _NETWORKS:
+        raise OutputError(_no_network(kind))
+    write = _write_geojson if kind == ExportKind.GEOJSON else _write_parquet
+
+    def write_all(temporary: Path) -> None:
+        for each, table in layers.items():
+            write(temporary, each, table, crs)
+
+    return _put(target, write_all)
+
+
+def _checked(
+    folder: str | PathLike[str], layers: Iterable[Layer], *, crs: str, kind: str, overwrite: bool
+) -> Path:
+    """Return the folder; raise `OutputError` if files cannot be written there."""
+    problems = check_export(folder, kind=kind, overwrite=overwrite, layers=layers)
+    if kind in _IN_WGS84 and not crs:
+        problems.append(
+            f"{_IN_WGS84[ExportKind(kind)]} is in WGS 84, but the layout has no CRS: give its "
+            "boundary one."
+        )
     if problems:
         raise OutputError(problems)
-    write = _write_geojson if chosen is ExportKind.GEOJSON else _write_parquet
+    return Path(folder)
+
+
+def _put(target: Path, write: Callable[[Path], None]) -> Path:
+    """Let files be written into a folder; they appear there when all are ready."""
     try:
         target.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target, prefix=".export-") as temporary:
-            made = [write(Path(temporary), each, table, crs) for each, table in layers.items()]
-            for file in made:
+            write(Path(temporary))
+            for file in sorted(Path(temporary).iterdir()):
                 file.replace(target / file.name)
     except (DataSourceError, DataLayerError, FeatureError, OSError) as error:
         raise OutputError(f"The export to {target} cannot be written: {error}") from error
@@ -116,14 +165,14 @@ def check_export(
     """
     if kind not in list(ExportKind):
         raise ParameterError(f"kind must be one of {', '.join(ExportKind)}; got {kind!r}.")
-    target = Path(folder)
+    target, chosen, known = Path(folder), ExportKind(kind), list(layers)
+    network = [] if chosen not in _NETWORKS or STREETS in known else [_no_network(kind)]
     if not target.exists():
-        return folder_problems(target.parent)
-    problems = folder_problems(target)
+        return network + folder_problems(target.parent)
+    problems = network + folder_problems(target)
     if problems or overwrite:
         return problems
-    names = (each.name + _suffix(each, ExportKind(kind)) for each in layers)
-    existing = [name for name in names if (target / name).exists()]
+    existing = [name for name in _file_names(chosen, known) if (target / name).exists()]
     if existing:
         problems.append(
             f"The folder {target} already holds {', '.join(existing)}: choose another, or allow "
@@ -132,13 +181,24 @@ def check_export(
     return problems
 
 
+def _no_network(kind: str) -> str:
+    others = " or ".join(kind for kind in ExportKind if not kind.of_layouts)
+    return f"{kind} is a format of layouts, which have a network of streets: choose {others}."
+
+
+def _file_names(kind: ExportKind, layers: Iterable[Layer]) -> tuple[str, ...]:
+    if kind in _NETWORKS:
+        return _NETWORKS[kind][1]
+    return tuple(each.name + _suffix(each, kind) for each in layers)
+
+
 def _suffix(layer: Layer, kind: ExportKind) -> str:
     if kind is ExportKind.PARQUET:
         return ".parquet"
     return ".csv" if layer.geometry is GeometryType.NONE else ".geojson"
 
 
-def _write_geojson(folder: Path, layer: Layer, table: Table, crs: str) -> Path:
+def _write_geojson(folder: Path, layer: Layer, table: Table, crs: str) -> None:
     path = folder / (layer.name + _suffix(layer, ExportKind.GEOJSON))
     names, values, masks = field_arrays(layer, table)
     spatial = layer.geometry is not GeometryType.NONE
@@ -153,16 +213,14 @@ def _write_geojson(folder: Path, layer: Layer, table: Table, crs: str) -> Path:
         crs=crs if spatial else None,
         encoding="UTF-8",
         layer_options=(
-            {"RFC7946": "YES", "COORDINATE_PRECISION": COORDINATE_DIGITS} if spatial else None
+            {"RFC7946": "YES", "COORDINATE_PRECISION": str(DEGREE_DIGITS)} if spatial else None
         ),
     )
-    return path
 
 
-def _write_parquet(folder: Path, layer: Layer, table: Table, crs: str) -> Path:
+def _write_parquet(folder: Path, layer: Layer, table: Table, crs: str) -> None:
     path = folder / (layer.name + _suffix(layer, ExportKind.PARQUET))
     try:
         table_frame(layer, table, crs=crs).to_parquet(path)
     except ImportError as error:
         raise DependencyError("GeoParquet needs the package pyarrow: install it.") from error
-    return path

@@ -123,6 +123,14 @@ class GeoLayout(MeasuredLayout):
 
         return write_layout(self.layout, path, overwrite=overwrite, record_seconds=record_seconds)
 
+    def export(
+        self, folder: str | PathLike[str], *, kind: str = "geojson", overwrite: bool = False
+    ) -> Path:
+        """Write plain files into a folder; see `urban_processing.io.exports.export_layout`."""
+        from urban_processing.io.exports import export_layout
+
+        return export_layout(self.layout, folder, kind=kind, overwrite=overwrite)
+
     def __repr__(self) -> str:
         tables = self.tables
         crs = self.layout.frame.crs or "no CRS"
@@ -194,6 +202,16 @@ class GeoLayers:
         from urban_processing.report.layers_map import plot_layers
 
         return plot_layers(self.made, path, ax=ax, title=title)
+
+    def export(
+        self, folder: str | PathLike[str], *, kind: str = "geojson", overwrite: bool = False
+    ) -> Path:
+        """Write plain files into a folder; see `urban_processing.io.exports.export_layers`."""
+        from urban_processing.io.exports import export_layers
+
+        return export_layers(
+            self.made.layers(), folder, crs=self.made.frame.crs, kind=kind, overwrite=overwrite
+        )
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(t):,} {each.name}" for each, t in self.made.tables.items())

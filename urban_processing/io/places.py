@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,39 +46,31 @@ def fetch_place(
     """
     if not name.strip():
         raise BoundaryError("The name of the place is empty.")
-    try:
-        import osmnx
-        import requests
-    except ImportError as error:
-        raise DependencyError("Places by name need the package osmnx: install it.") from error
+    osmnx = import_osmnx("Places by name")
     folder = default_cache_folder() if cache_folder is None else Path(cache_folder)
-    settings = {"use_cache": True, "cache_folder": folder, "requests_timeout": TIMEOUT_SECONDS}
-    try:
-        with _settings_of(osmnx, settings):
+    with asking(
+        osmnx,
+        folder,
+        unreached=f"The place {name!r} could not be looked up: the geocoder of OpenStreetMap",
+        instead="give the boundary as a file",
+        what=repr(name),
+    ):
+        try:
             return osmnx.geocode_to_gdf(name)
-    except requests.exceptions.RequestException as error:
-        raise DependencyError(
-            f"The place {name!r} could not be looked up: the geocoder of OpenStreetMap cannot be "
-            "reached. Check the network, or give the boundary as a file."
-        ) from error
-    except OSError as error:
-        raise DependencyError(
-            f"The answer for {name!r} cannot be kept in {folder}: {error.strerror or error}."
-        ) from error
-    except TypeError as error:
-        raise BoundaryError(
-            f"OpenStreetMap knows {name!r}, but only as a point or a line, not as an area. Name "
-            "the district or municipality, or give the boundary as a file."
-        ) from error
-    except ValueError as error:
-        if "0 results" in str(error):
+        except TypeError as error:
             raise BoundaryError(
-                f"OpenStreetMap has no place {name!r}. Write it as 'district, city, country'."
+                f"OpenStreetMap knows {name!r}, but only as a point or a line, not as an area. "
+                "Name the district or municipality, or give the boundary as a file."
             ) from error
-        raise DependencyError(
-            f"The geocoder of OpenStreetMap gave no usable answer for {name!r}: try again later, "
-            "or give the boundary as a file."
-        ) from error
+        except ValueError as error:
+            if "0 results" in str(error):
+                raise BoundaryError(
+                    f"OpenStreetMap has no place {name!r}. Write it as 'district, city, country'."
+                ) from error
+            raise DependencyError(
+                f"The geocoder of OpenStreetMap gave no usable answer for {name!r}: try again "
+                "later, or give the boundary as a file."
+            ) from error
 
 
 def default_cache_folder() -> Path:
@@ -90,6 +82,69 @@ def default_cache_folder() -> Path:
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "urban_processing" / "places"
+
+
+def import_osmnx(purpose: str) -> Any:
+    """Return the package osmnx.
+
+    Raises
+    ------
+    DependencyError
+        If it is not installed; says what it was needed for.
+    """
+    try:
+        import osmnx
+    except ImportError as error:
+        raise DependencyError(f"{purpose} need the package osmnx: install it.") from error
+    return osmnx
+
+
+@contextmanager
+def asking(
+    osmnx: Any,
+    folder: Path,
+    *,
+    unreached: str,
+    instead: str,
+    what: str,
+    settings: Mapping[str, Any] | None = None,
+) -> Iterator[None]:
+    """Ask a server of OpenStreetMap by osmnx, with its answers kept in a folder of ours.
+
+    Parameters
+    ----------
+    osmnx
+        The package.
+    folder
+        Where to keep answers.
+    unreached
+        How the sentence begins that says that a server cannot be reached.
+    instead
+        What the user may do without a network.
+    what
+        What the answer is about.
+    settings
+        Settings of osmnx besides those of its cache.
+
+    Raises
+    ------
+    DependencyError
+        If the server cannot be reached, or the answer not be kept.
+    """
+    import requests
+
+    own = {"use_cache": True, "cache_folder": folder, "requests_timeout": TIMEOUT_SECONDS}
+    try:
+        with _settings_of(osmnx, own | dict(settings or {})):
+            yield
+    except requests.exceptions.RequestException as error:
+        raise DependencyError(
+            f"{unreached} cannot be reached. Check the network, or {instead}."
+        ) from error
+    except OSError as error:
+        raise DependencyError(
+            f"The answer for {what} cannot be kept in {folder}: {error.strerror or error}."
+        ) from error
 
 
 @contextmanager

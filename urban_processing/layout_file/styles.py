@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET  # nosec B405: written here, never parsed
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from urban_processing.calibration.layers import OBSERVED_PARCELS
 from urban_processing.metrics.subdivisions import PATIO_USE
 from urban_processing.parcelling.layers import SUBDIVIDED_PARCELS
 from urban_processing.schema import GeometryType, Layer
@@ -60,8 +61,10 @@ def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     rules = list(_RULES[name]())
     if layer == SUBDIVIDED_PARCELS:  # over what the other rules draw of an irregular patio
         rules.append(_Rule("Patio", f"\"land_use\" = '{PATIO_USE}'", [_fill(_GREEN)], "fill"))
-    if name == "parcels" and "irregularity" not in layer.column_names:
-        rules = _changed()  # parcels that were not measured, but carried over
+    if name == "parcels" and "change" in layer.column_names:
+        rules = _changed()
+    if name == "parcels" and set(OBSERVED_PARCELS.column_names) <= set(layer.column_names):
+        rules = _observed()
     if places_only and layer.geometry is GeometryType.ANY:
         rules = [rule for rule in rules if rule.symbol == "marker"]
     root = ET.Element(
@@ -251,6 +254,14 @@ def _issues() -> list[_Rule]:
     return [
         _Rule("Issue at a place", kind + "'Point'", [alert], "marker"),
         _Rule("Issue of an area", kind + "'Polygon'", [area], "fill"),
+    ]
+
+
+def _observed() -> list[_Rule]:
+    """Parcels that count, and those that are left out."""
+    return [
+        _Rule("Parcel", '"block_id" IS NOT NULL', [_fill(_PAPER)], "fill"),
+        _Rule("Left out", "ELSE", [_fill(_SURFACE)], "fill"),
     ]
 
 

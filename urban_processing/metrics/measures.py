@@ -219,7 +219,7 @@ def _of_parcels(known: FabricMeasures, part: int | None) -> dict[str, float]:
     for suffix, chosen in (("", inside), (INTERIOR, inside & ~measures.rim)):
         found = {
             **parcel_values(known.fabric, measures, chosen, counted_area=known.counted_area),
-            **known.routes.parcel_values(chosen),
+            **known.routes.parcel_values(part, interior=suffix == INTERIOR),
             "parcels_per_km2": 1e6 * int(chosen.sum()) / land,
         }
         values |= {name + suffix: value for name, value in found.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from urban_processing.access_rule import reached_frontage
@@ -122,6 +123,14 @@ def measure_rings(rings: ParcelRings) -> ParcelMeasures:
         reached=rings.frontage >= enough,
         through=_through_lots(side, enough),
     )
+
+
+def box_sides(polygons: npt.NDArray[np.object_]) -> FloatArray:
+    """Return the (n, 2) shorter and longer sides of the smallest rotated rectangles around."""
+    boxes = shapely.minimum_rotated_rectangle(polygons)
+    corners = shapely.get_coordinates(boxes).reshape(-1, 5, 2)[:, :3]
+    sides = np.hypot(*np.moveaxis(np.diff(corners, axis=1), 2, 0))
+    return np.asarray(np.sort(sides, axis=1))
 
 
 def width_and_depth(layout: Layout) -> tuple[FloatArray, FloatArray]:

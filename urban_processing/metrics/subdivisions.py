@@ -6,14 +6,13 @@ from collections import Counter
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import ragged_rows
 from urban_processing.fabric.model import ParcelRings
 from urban_processing.layout import PARCEL_USE
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.metrics.parcels import ParcelMeasures, measure_rings
+from urban_processing.metrics.parcels import ParcelMeasures, box_sides, measure_rings
 from urban_processing.metrics.tables import parcel_columns
 from urban_processing.parcelling.layers import SUBDIVIDED_BLOCKS, SUBDIVIDED_PARCELS
 from urban_processing.parcelling.rules import rule_values
@@ -34,14 +33,6 @@ SUBDIVISION_KIND = "subdivision"
 
 PATIO_USE = "patio"
 """Land use of the inside of a perimeter block."""
-
-
-def box_sides(polygons: npt.NDArray[np.object_]) -> FloatArray:
-    """Return the (n, 2) shorter and longer sides of the smallest rotated rectangles around."""
-    boxes = shapely.minimum_rotated_rectangle(polygons)
-    corners = shapely.get_coordinates(boxes).reshape(-1, 5, 2)[:, :3]
-    sides = np.hypot(*np.moveaxis(np.diff(corners, axis=1), 2, 0))
-    return np.asarray(np.sort(sides, axis=1))
 
 
 class MeasuredSubdivision:

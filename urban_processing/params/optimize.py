@@ -22,6 +22,21 @@ class Energy(enum.StrEnum):
 
 _WEIGHTS, _EDITED = "Weights", "Edited layers"
 
+Snap = Annotated[
+    float,
+    Param(
+        label="Tolerance of edited layers",
+        help="Gaps and overlaps of edited parcels, and distances of streets from parcel "
+        "boundaries, are closed up to this width.",
+        unit="m",
+        above=0,
+        maximum=10,
+        advanced=True,
+        group=_EDITED,
+    ),
+]
+"""The parameter of algorithms that read layouts which people may have edited."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class OptimizeParams(Params):
@@ -83,19 +98,7 @@ class OptimizeParams(Params):
             above=0,
         ),
     ] = None
-    snap: Annotated[
-        float,
-        Param(
-            label="Tolerance of edited layers",
-            help="Gaps and overlaps of edited parcels, and distances of streets from parcel "
-            "boundaries, are closed up to this width.",
-            unit="m",
-            above=0,
-            maximum=10,
-            advanced=True,
-            group=_EDITED,
-        ),
-    ] = 0.05
+    snap: Snap = 0.05
 
     def contradictions(self, called: Naming) -> list[str]:
         """Return what contradicts: weights that leave nothing to optimize."""

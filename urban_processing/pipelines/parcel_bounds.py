@@ -7,7 +7,8 @@ import shapely
 
 from urban_processing.access_rule import reached_frontage
 from urban_processing.mesh.planar import BoolArray, FloatArray
-from urban_processing.metrics.subdivisions import MeasuredSubdivision, box_sides
+from urban_processing.metrics.parcels import box_sides
+from urban_processing.metrics.subdivisions import MeasuredSubdivision
 from urban_processing.params.subdivide import Strategy
 from urban_processing.parcelling.subdivision import Subdivision
 from urban_processing.site import AREA_ROUNDING, Issue

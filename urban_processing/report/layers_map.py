@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import PathCollection
-from matplotlib.colors import to_rgb
+from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from urban_processing.calibration.layers import CALIBRATION_KIND
 from urban_processing.errors import ParameterError
 from urban_processing.metrics.subdivisions import PATIO_USE
 from urban_processing.report.figure import (
@@ -24,6 +25,7 @@ from urban_processing.report.figure import (
     scale_of,
 )
 from urban_processing.report.legend import (
+    draw_colour_bar,
     draw_legend,
     draw_scale_bar,
     parcel_entries,
@@ -37,13 +39,18 @@ from urban_processing.report.palette import (
     PARCEL,
     PATIO,
     SURFACE,
+    VALUE_RAMP,
     Scale,
     parcel_colours,
 )
+from urban_processing.schema import TRUE_AREA
 from urban_processing.tables import LayerSet, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_PARCEL_ORDER = 1.2
+"""Parcels lie above the right-of-way and below the outlines of blocks."""
 
 _GROUND = ("blocks", "parcels")
 """Layers of areas that a map may stand on, the first one there gives its extent."""
@@ -58,7 +65,8 @@ def plot_layers(
 ) -> Figure:
     """Draw a map of blocks, and of the parcels in them.
 
-    Parcels are coloured as in `urban_processing.report.map.plot_layout`.
+    Parcels are coloured as in `urban_processing.report.map.plot_layout`, those of a calibration
+    by their areas.
 
     Parameters
     ----------
@@ -87,7 +95,10 @@ def plot_layers(
     if ax is None:
         ax = new_axes(extent, title=title, longer=_longer_side(tables))
     frame_land(ax, extent)
-    _draw(ax, tables, scale_of(ax, tables.get("parcels", ground)["area_m2"]))
+    scale = scale_of(ax, tables.get("parcels", ground)["area_m2"])
+    _draw(ax, tables, scale)
+    if made.kind == CALIBRATION_KIND and "parcels" in tables:
+        _colour_by_area(ax, tables["parcels"], scale)
     figure = root_figure(ax)
     if target is not None:
         save(figure, target)
@@ -113,10 +124,22 @@ def _draw(ax: Axes, tables: dict[str, Table], scale: Scale) -> None:
             entries.append(swatch(BLOCK, f"{n:,} block{'s' if n > 1 else ''}"))
     if "parcels" in tables:
         parcels = tables["parcels"]
-        _areas(ax, parcels, _colours(parcels), edge=OUTLINE, width=scale.outline, zorder=1.2)
+        _areas(
+            ax, parcels, _colours(parcels), edge=OUTLINE, width=scale.outline, zorder=_PARCEL_ORDER
+        )
         entries += _parcel_entries(parcels)
     draw_scale_bar(ax, scale)
     draw_legend(ax, entries, scale)
+
+
+def _colour_by_area(ax: Axes, parcels: Table, scale: Scale) -> None:
+    """Colour the parcels by their areas, on a scale that shows small and large ones."""
+    low, high = np.percentile(parcels["area_m2"], [2, 98])
+    areas = next(each for each in ax.collections if each.get_zorder() == _PARCEL_ORDER)
+    areas.set_array(parcels["area_m2"])
+    areas.set_cmap(VALUE_RAMP)
+    areas.set_norm(LogNorm(0.999 * low, 1.001 * high))
+    draw_colour_bar(ax, areas, scale, label=TRUE_AREA.label)
 
 
 def _areas(

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import Collection
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import Normal, withStroke
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from urban_processing.errors import ParameterError
 from urban_processing.mesh.corners import IRREGULAR
@@ -26,7 +29,6 @@ from urban_processing.report.palette import (
     TRIANGLE,
     Scale,
 )
-from urban_processing.schema import PARCELS
 from urban_processing.tables import Table
 
 LEGEND_SHARE = 0.74
@@ -166,12 +168,15 @@ def swatch(colour: Any, label: str) -> Patch:
     return Patch(facecolor=colour, edgecolor=FAINT, linewidth=0.6, label=label)
 
 
-def draw_colour_bar(ax: Axes, colour_by: str, scale: Scale) -> None:
-    """Draw the ramp of the values of a parcels' column below the map."""
-    column = PARCELS.column(colour_by)
+def draw_colour_bar(ax: Axes, areas: Collection, scale: Scale, *, label: str) -> None:
+    """Draw the ramp of the values that areas are coloured by below the map."""
     height = _height_inches(ax)
     inset = ax.inset_axes((0.38, -0.033 * scale.text / height, 0.3, 0.1 / height))
-    bar = root_figure(ax).colorbar(ax.collections[0], cax=inset, orientation="horizontal")
+    bar = root_figure(ax).colorbar(areas, cax=inset, orientation="horizontal")
     bar.outline.set_linewidth(0.4)
+    if isinstance(areas.norm, LogNorm):
+        inset.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        inset.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        inset.xaxis.set_minor_locator(NullLocator())
     inset.tick_params(labelsize=0.85 * scale.text, length=2, colors=INK)
-    inset.set_title(column.label, size=scale.text, color=INK, pad=3)
+    inset.set_title(label, size=scale.text, color=INK, pad=3)

@@ -141,7 +141,8 @@ def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
     draw_scale_bar(ax, scale)
     draw_legend(ax, legend_entries(tables, colour_by, colours), scale)
     if colour_by is not None:
-        draw_colour_bar(ax, colour_by, scale)
+        label = PARCELS.column(colour_by).label
+        draw_colour_bar(ax, ax.collections[0], scale, label=label)
 
 
 def _extent(tables: dict[str, Table]) -> Extent:

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from urban_processing.layout import EdgeKind, Layout
-from urban_processing.mesh.planar import OUTSIDE, IntArray
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, IntArray
 from urban_processing.rights_of_way.partition import RightsOfWay, partition
 from urban_processing.rights_of_way.surfaces import (
     Circles,
@@ -71,9 +71,13 @@ class _Source:
         return (
             a.mesh is b.mesh
             and a.street_rules == b.street_rules
+            and a.fixed_streets == b.fixed_streets
             and all(
                 np.array_equal(getattr(a, name), getattr(b, name))
-                for name in ("edge_street", "edge_level", "edge_kind", "face_part")
+                for name in (
+                    *("edge_street", "edge_level", "edge_kind", "edge_fixed"),
+                    *("vertex_entry", "face_part"),
+                )
             )
         )
 
@@ -117,17 +121,21 @@ def _street_sides(layout: Layout, network: StreetNetwork) -> StreetSides:
     return StreetSides(sides[:, 0], ends, width[edge], rank[edge])
 
 
+def dead_ends(layout: Layout, network: StreetNetwork) -> BoolArray:
+    """(N,) nodes where a street ends inside the land; on its outer rim a street leaves it."""
+    on_rim = layout.mesh.vertices_of(layout.edge_kind == EdgeKind.RIM)
+    return np.asarray((network.node_kind == NodeKind.END) & ~on_rim[network.node_vertex])
+
+
 def _turning_heads(layout: Layout, network: StreetNetwork) -> Circles:
-    """Circles at dead ends, but for those on the outer rim, where a street leaves the land."""
+    """Circles at dead ends."""
     mesh, radius = layout.mesh, layout.street_rules.turning_radius
-    on_rim = mesh.vertices_of(layout.edge_kind == EdgeKind.RIM)
     first = network.half_edges[network.offsets[:-1]]
     last = network.half_edges[network.offsets[1:] - 1]
     half = np.concatenate([first, last ^ 1])
     node = np.concatenate([network.start, network.end])
     edge = np.tile(np.arange(network.n_edges), 2)
-    dead = network.node_kind[node] == NodeKind.END
-    dead &= ~on_rim[mesh.origin[half]] & (radius > 0) & (network.edge_width[edge] > 0)
+    dead = dead_ends(layout, network)[node] & (radius > 0) & (network.edge_width[edge] > 0)
     half, edge = half[dead], edge[dead]
     beside = np.stack([mesh.face[half], mesh.face[half ^ 1]])
     block = layout.face_block[beside.max(axis=0)]
