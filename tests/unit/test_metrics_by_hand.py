@@ -159,7 +159,7 @@ def crossing() -> tuple[Layout, dict[str, float]]:
         "p_area": 1,
         "undesirable_pct": 0,
         "undesirable": 0,
-        "neighbours_mean": 2,
+        "neighbours_mean": 0,  # streets all around
         "through_lots": 4,
         "through_lots_pct": 100,
         "area_mean_m2": 6000,
@@ -285,7 +285,7 @@ def dead_end() -> tuple[Layout, dict[str, float]]:
         "p_area": 1,
         "undesirable_pct": 0,
         "undesirable": 0,
-        "neighbours_mean": 2 * (2 * 3 + 4) / 8,  # six borders along the rows, four across
+        "neighbours_mean": 2 * (4 + 3) / 8,  # borders along the rows and across, but for streets
         "through_lots": 2,  # beside the dead end
         "through_lots_pct": 25,
         "area_mean_m2": 2000,
@@ -414,7 +414,7 @@ def entries() -> tuple[Layout, dict[str, float]]:
         "p_area": 1,
         "undesirable_pct": 0,
         "undesirable": 0,
-        "neighbours_mean": 2 * (3 * 3 + 2 * 4) / 12,
+        "neighbours_mean": 2 * (7 + 4) / 12,  # along the rows and across, but for streets
         "through_lots": 0,
         "through_lots_pct": 0,
         "area_mean_m2": 900,
@@ -480,7 +480,7 @@ def entries() -> tuple[Layout, dict[str, float]]:
         "thinness_mean_interior": 1,
         "thinness_min_interior": 1,
         "p_area_interior": 1,
-        "neighbours_mean_interior": 4,
+        "neighbours_mean_interior": 2,
         "area_mean_m2_interior": 900,
         "area_min_over_mean_interior": 1,
         "area_max_over_min_area_interior": 2.25,

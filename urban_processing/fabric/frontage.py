@@ -26,6 +26,10 @@ ALONG_DEG = 50.0
 """A boundary on a street makes at most this angle with its centreline: cut-off corners of 45°
 are on one of their streets."""
 
+PARALLEL_DEG, LEAST_RUN = 5.0, 12.0
+"""Lines that lie on each other make at most this angle, or do so for so many times the distance
+between them: at sharp corners others are as near, over a short length."""
+
 ROUNDED_DIGITS = 3
 """Streets as far away, to this many digits of a metre, are as near."""
 
@@ -103,7 +107,7 @@ def touching_parcels(boundary: Segments) -> Touching:
     """Where parcels touch, but for gaps of `PARCEL_GAP`."""
     found = find_overlaps(boundary, boundary, PARCEL_GAP, clipped=True, least=GRID)
     owner, other = boundary.line[found.first], boundary.line[found.second]
-    kept = (owner != other) & (found.angle <= ALIGNED_DEG)
+    kept = (owner != other) & _runs_along(found, boundary)
     found = found.take(kept)
     return Touching(found.first, other[kept], found.low, found.high)
 
@@ -183,7 +187,7 @@ def pieces_on_streets(
         Metres.
     """
     along = find_overlaps(boundary, streets.segments, snap, clipped=True, least=GRID)
-    along = along.take(along.angle <= ALIGNED_DEG)
+    along = along.take(_runs_along(along, boundary))
     free = _free(boundary, touching)
     beside = find_overlaps(
         boundary, streets.segments, streets.width / 2 + reach, clipped=True, least=GRID
@@ -194,6 +198,13 @@ def pieces_on_streets(
     cells = _cells(boundary, candidates, free)
     found = _nearest(cells, candidates, boundary, parcels, streets)
     return _merged(found)
+
+
+def _runs_along(along: Overlaps, first: Segments) -> BoolArray:
+    """Pairs that run along each other, and do not only part at a sharp corner."""
+    length = (along.high - along.low) * first.length[along.first]
+    parallel = (along.angle <= PARALLEL_DEG) | (length >= LEAST_RUN * along.far)
+    return np.asarray((along.angle <= ALIGNED_DEG) & parallel)
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,6 +49,9 @@ INSIDE_SHARE = 0.5
 OVERLAP_SHARE = 1e-3
 """Parcels that overlap by more than this share of their area are told of."""
 
+LEAST_FRONT = 0.1
+"""A parcel that has no more than so many metres on a street touches it at a corner."""
+
 RIM_LENGTH = 0.5
 """Parcels lie on the rim if more than so many metres of their boundary do."""
 
@@ -303,6 +306,7 @@ class _Reading:
             snap=max(self.params.snap_tolerance, NODE_GRID),
             reach=self.params.street_reach,
         )
+        pieces = _without_touches(pieces, boundary, ground)
         block = _blocks_of(polygons, ground)
         taken = None
         if self.streets is not None:
@@ -365,6 +369,20 @@ def _street_segments(ground: StreetsInLand) -> StreetSegments:
     )
 
 
+def _without_touches(
+    pieces: StreetPieces, boundary: Segments, ground: StreetsInLand
+) -> StreetPieces:
+    """Pieces of parcels that have more than `LEAST_FRONT` metres on a network edge.
+
+    Of these, pieces below a tenth of that are what rounding leaves at corners.
+    """
+    length = (pieces.high - pieces.low) * boundary.length[pieces.edge]
+    key = boundary.line[pieces.edge] * np.int64(max(ground.network.n_edges, 1))
+    _, index = np.unique(key + ground.edge_of[pieces.segment], return_inverse=True)
+    total = np.bincount(index.ravel(), weights=length)
+    return pieces.take((total[index.ravel()] > LEAST_FRONT) & (length > LEAST_FRONT / 10))
+
+
 def _blocks_of(polygons: Geometries, ground: StreetsInLand) -> IntArray:
     if not ground.network.n_edges:
         return np.full(len(polygons), NO_BLOCK)
@@ -423,9 +441,18 @@ def _on_rim(boundary: Segments, land: Geometries, n: int) -> BoolArray:
 
 
 def _fronts(pieces: StreetPieces, boundary: Segments, ground: StreetsInLand) -> Fronts:
-    parcel = boundary.line[pieces.edge]
+    """One piece for each edge of a parcel and each network edge that it lies along."""
     edge = ground.edge_of[pieces.segment]
-    at: FloatArray = ground.along(pieces.segment, pieces.share)
     length = (pieces.high - pieces.low) * boundary.length[pieces.edge]
-    order = np.lexsort((np.round(at, 6), edge, parcel))
-    return Fronts(parcel[order], edge[order], at[order], length[order])
+    at = ground.along(pieces.segment, pieces.share)
+    key = pieces.edge * np.int64(max(ground.network.n_edges, 1)) + edge
+    _, first, index = np.unique(key, return_index=True, return_inverse=True)
+    index = index.ravel()
+    total: FloatArray = np.zeros(len(first))
+    np.add.at(total, index, length)
+    middle = np.bincount(index, weights=length * at, minlength=len(first)) / total
+    parcel, edge = boundary.line[pieces.edge[first]], edge[first]
+    # rounding may lead beyond the end of an edge
+    middle = np.clip(middle, 0.0, ground.network.edge_length[edge])
+    order = np.lexsort((np.round(middle, 6), edge, parcel))
+    return Fronts(parcel[order], edge[order], middle[order], total[order])

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import rings_of
-from urban_processing.blocks.noding import Centrelines
+from urban_processing.blocks.noding import NODE_GRID, Centrelines
 from urban_processing.fabric.frontage import (
     StreetSegments,
     Touching,
@@ -173,8 +173,14 @@ def _prepared(geometry: shapely.Geometry) -> shapely.Geometry:
 
 
 def _sorted(land: shapely.Geometry) -> tuple[shapely.Polygon, ...]:
-    """Polygons on the grid, the largest first, with canonical rings."""
-    snapped = shapely.set_precision(land, GRID)
+    """Polygons on the grid, the largest first, with canonical rings.
+
+    Spikes, clefts and holes as thin as rounding go, and vertices on straight edges.
+    """
+    smooth = land
+    for distance in (2 * NODE_GRID, -4 * NODE_GRID, 2 * NODE_GRID):
+        smooth = shapely.buffer(smooth, distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
+    snapped = shapely.set_precision(shapely.simplify(smooth, 2 * NODE_GRID), GRID)
     parts = shapely.get_parts(snapped)
     polygons = canonical_rings(parts[shapely.get_dimensions(parts) == 2])
     return tuple(sorted(polygons.tolist(), key=lambda p: (-round(p.area, 3), p.bounds, p.wkb)))
