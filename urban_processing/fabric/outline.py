@@ -8,12 +8,8 @@ import shapely
 
 from urban_processing.blocks.model import rings_of
 from urban_processing.blocks.noding import NODE_GRID, Centrelines
-from urban_processing.fabric.frontage import (
-    StreetSegments,
-    Touching,
-    boundary_segments,
-    pieces_on_streets,
-)
+from urban_processing.fabric.frontage import StreetSegments, pieces_on_streets
+from urban_processing.fabric.touching import Touching, boundary_segments
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.overlap import segments_of
 from urban_processing.mesh.places import line_segments
@@ -92,7 +88,7 @@ def _strips(
         outline,
         polygons,
         StreetSegments(streets, 2 * half[streets.line], np.empty((0, 2)), nowhere),
-        Touching(nowhere, nowhere, np.empty(0), np.empty(0)),
+        Touching(nowhere, np.empty(0), np.empty(0), nowhere),
         snap=GRID,
         reach=reach,
     )
