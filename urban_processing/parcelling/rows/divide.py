@@ -143,7 +143,7 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
         skeleton, offset=float(rules.offset[k]), area=area, bounds=bounds
     )
     following = skeleton.following.tolist()
-    sheet = Sheet(skeleton.xy, skeleton.height, following, polygon.place)
+    sheet = Sheet(skeleton.xy, skeleton.height, following, place=polygon.place)
     needs = Needs(
         area=bounds.min_area,
         depth=bounds.min_area / bounds.max_width,

@@ -105,7 +105,7 @@ def polygons_of(ground: Ground) -> Iterator[Polygon]:
 def whole(polygon: Polygon) -> Divided:
     """Return a polygon as one face."""
     height = np.zeros(len(polygon.xy))
-    sheet = Sheet(polygon.xy, height, polygon.following, polygon.place)
+    sheet = Sheet(polygon.xy, height, polygon.following, place=polygon.place)
     rings = [list(range(a, b)) for a, b in pairwise(polygon.offsets.tolist())]
     return Divided(polygon, sheet, [Face(rings, polygon.lineage, 0)])
 

@@ -32,7 +32,7 @@ class Sheet:
         Next vertex of the contour after each of its vertices, as in `Skeleton`: where its rings
         touch, each corner of the land has a vertex of its own.
     place
-        First vertex at the place of each vertex of the contour.
+        First vertex at the place of each vertex of the contour; by default each is alone.
     """
 
     def __init__(
@@ -40,9 +40,11 @@ class Sheet:
         xy: FloatArray,
         height: FloatArray,
         following: Sequence[int],
-        place: Sequence[int],
+        *,
+        place: Sequence[int] | None = None,
     ) -> None:
         n_contour = len(following)
+        place = range(n_contour) if place is None else place
         self.x: list[float] = xy[:n_contour, 0].tolist()
         self.y: list[float] = xy[:n_contour, 1].tolist()
         self.x += [to_grid(value) for value in xy[n_contour:, 0].tolist()]
