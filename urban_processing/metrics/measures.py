@@ -188,10 +188,10 @@ def measure_fabric(known: FabricMeasures) -> tuple[Metric, ...]:
         for spec in METRICS:
             if part is not None and not spec.by_part:
                 continue
-            out.append(Metric(part, spec.name, values.get(spec.name, math.nan), spec.unit))
+            out.append(Metric(part, spec.name, float(values.get(spec.name, math.nan)), spec.unit))
             if spec.of_parcels:
                 name = spec.name + INTERIOR
-                out.append(Metric(part, name, values.get(name, math.nan), spec.unit))
+                out.append(Metric(part, name, float(values.get(name, math.nan)), spec.unit))
     return tuple(out)
 
 
