@@ -24,7 +24,7 @@ EDGES = {"__init__.py", "__main__.py", "api", "cli", "io"}
 """What of the library stays out: the rooms that talk to terminals, pyproj and geopandas."""
 
 OUT_OF_PLUGIN = {"build.py"}
-SHIPPED = {".py", ".txt", ".svg"}
+SHIPPED = {".py", ".txt", ".svg", ".css", ".jinja"}
 FIXED_TIME = (2000, 1, 1, 0, 0, 0)
 GPL = "qgis_plugin/LICENSE"
 

@@ -17,6 +17,7 @@ from qgis.core import (
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
+    QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
     QgsProcessingParameterString,
 )
@@ -57,6 +58,12 @@ _LAYERS = {
 }
 """Inputs that are layers, and their geometry."""
 
+FILES = (InputKind.LAYOUT, InputKind.SUBDIVISION, InputKind.FABRIC)
+"""Inputs that are single files."""
+
+_ELSEWHERE = (InputKind.OPEN_STREET_MAP,)
+"""Inputs that QGIS has other ways for: a layer of OpenStreetMap is one of streets."""
+
 _SINK_TYPES = {
     GeometryType.NONE: QgsProcessing.SourceType.TypeVector,
     GeometryType.POINT: QgsProcessing.SourceType.TypeVectorPoint,
@@ -71,6 +78,9 @@ _FILES = {
     OutputKind.LAYOUT: _GEOPACKAGE,
     OutputKind.LAYERS: _GEOPACKAGE,
     OutputKind.MAP: "PNG (*.png);;SVG (*.svg);;PDF (*.pdf)",
+    OutputKind.REPORT: "HTML (*.html)",
+    OutputKind.JSON: "JSON (*.json)",
+    OutputKind.CSV: "CSV (*.csv)",
 }
 """Outputs that are single files. An export, a folder of plain files, is none of QGIS's: each
 sink goes to a file of its own."""
@@ -133,13 +143,14 @@ def definitions(spec: AlgorithmSpec) -> Iterator[QgsProcessingParameterDefinitio
     """
     fields = [field for panel in spec.panels().values() for field in panel]
     plain = [field for field in fields if not field.param.advanced]
-    needed = [item for item in spec.inputs if item.required]
+    inputs = [item for item in spec.inputs if item.kind not in _ELSEWHERE]
+    needed = [item for item in inputs if item.required]
     first = [field for field in plain if needed and field.param.group == plain[0].param.group]
     for item in needed:
         yield _input(item)
     for field in first:
         yield _parameter(field)
-    for item in spec.inputs:
+    for item in inputs:
         if not item.required:
             yield _input(item)
     for field in plain:
@@ -174,6 +185,11 @@ def _input(item: Input) -> QgsProcessingParameterDefinition:
         kinds = [_LAYERS[item.kind]]
         source = QgsProcessingParameterFeatureSource(name, item.label, kinds, optional=optional)
         return _helped(source, item.help + _SELECTION)
+    if item.kind is InputKind.FABRICS:
+        several = QgsProcessingParameterMultipleLayers(
+            name, item.label, QgsProcessing.SourceType.TypeFile, optional=optional
+        )
+        return _helped(several, item.help)
     file = QgsProcessingParameterFile(
         name,
         item.label,

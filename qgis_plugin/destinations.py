@@ -20,9 +20,9 @@ from qgis.core import (
     QgsVectorLayer,
 )
 
-from qgis_plugin.definitions import SinkName, files, is_given, parameter_name, sinks
+from qgis_plugin.definitions import FILES, SinkName, files, is_given, parameter_name, sinks
 from urban_processing.algorithms import InputKind, Output, OutputKind
-from urban_processing.paths import file_problems, geopackage_problems, map_problems
+from urban_processing.paths import ending_problems, file_problems, geopackage_problems
 
 if TYPE_CHECKING:
     from qgis_plugin.algorithm import SpecAlgorithm
@@ -87,11 +87,6 @@ class Destinations:
         """Return one sentence for each reason why a result cannot go where it is to."""
         problems: list[str] = []
         taken = [(place, "the input") for place in self._read()]
-        checks = {
-            OutputKind.LAYOUT: geopackage_problems,
-            OutputKind.LAYERS: geopackage_problems,
-            OutputKind.MAP: map_problems,
-        }
         for name, place in self._sink_places().items():
             label = self._label(name)
             if place.table is None:
@@ -99,7 +94,7 @@ class Destinations:
             problems += _collisions(label, place, taken)
         for name, (output, path) in self.files.items():
             label = self._label(name)
-            problems += [f"{label}: {problem}" for problem in checks[output.kind](path)]
+            problems += [f"{label}: {problem}" for problem in _file_problems(output.kind, path)]
             problems += _collisions(label, Place(path.resolve()), taken)
             if output.kind.is_geopackage and path.resolve() in self._loaded():
                 problems.append(
@@ -140,8 +135,12 @@ class Destinations:
             name = parameter_name(item.name)
             if not is_given(self.parameters, name):
                 continue
-            if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION):
+            if item.kind in FILES:
                 found.add(Place(Path(str(self.parameters[name])).resolve()))
+                continue
+            if item.kind is InputKind.FABRICS:
+                paths = self.algorithm.parameterAsFileList(self.parameters, name, self.context)
+                found |= {Place(Path(path).resolve()) for path in paths}
                 continue
             layer = self.algorithm.parameterAsVectorLayer(self.parameters, name, self.context)
             found |= _places_of(layer)
@@ -152,6 +151,12 @@ class Destinations:
         project = self.context.project()
         layers = [] if project is None else project.mapLayers().values()
         return {place.path for layer in layers for place in _places_of(layer)}
+
+
+def _file_problems(kind: OutputKind, path: Path) -> list[str]:
+    if kind.is_geopackage:
+        return geopackage_problems(path)
+    return ending_problems(path, kind.value, kind.endings)
 
 
 def _places_of(layer: QgsMapLayer | None) -> set[Place]:

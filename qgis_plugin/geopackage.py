@@ -79,6 +79,13 @@ class Ogr:
             file = _required(gdal.OpenEx(str(path), gdal.OF_VECTOR | gdal.OF_READONLY))
             return [file.GetLayer(i).GetName() for i in range(file.GetLayerCount())]
 
+    def column_names(self, path: Path, layer: str) -> list[str]:
+        """Return the names of a layer's columns."""
+        with _os_errors():
+            file = _required(gdal.OpenEx(str(path), gdal.OF_VECTOR | gdal.OF_READONLY))
+            definition = _required(file.GetLayerByName(layer)).GetLayerDefn()
+            return [definition.GetFieldDefn(i).GetName() for i in range(definition.GetFieldCount())]
+
 
 OGR = Ogr()
 

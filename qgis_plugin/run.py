@@ -11,7 +11,7 @@ from qgis_plugin.crs import crs_of
 from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
-from qgis_plugin.products import product
+from qgis_plugin.products import product, write_report
 from qgis_plugin.results import write_sink
 from qgis_plugin.sources import Sources
 from qgis_plugin.styling import ResultGroup
@@ -63,8 +63,12 @@ def run(
     progress.update(0.95, "Writing the results")
     results: dict[str, Any] = {}
     for name, (output, path) in destinations.files.items():
-        whole = products[output.of or output.name]
-        (whole.write if output.kind.is_geopackage else whole.plot)(path)
+        of = output.of or output.name
+        if of in products:
+            whole = products[of]
+            (whole.write if output.kind.is_geopackage else whole.plot)(path)
+        else:
+            write_report(output.kind, made[of], path)
         results[name] = str(path)
     groups = {
         name: ResultGroup(_title(sources.name, spec, params), whole.history)

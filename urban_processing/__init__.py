@@ -19,16 +19,21 @@ if TYPE_CHECKING:
     from urban_processing.api import (
         calibrate,
         cogenerate,
+        compare,
         find_blocks,
+        measure,
         optimize,
         subdivide,
         transfer,
     )
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
+    from urban_processing.io.measured import GeoComparison, GeoFabric
     from urban_processing.params.blocks import BlocksParams
     from urban_processing.params.calibrate import CalibrateParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
+    from urban_processing.params.compare import CompareParams
+    from urban_processing.params.measure import MeasureParams
     from urban_processing.params.optimize import OptimizeParams
     from urban_processing.params.rules import Preset
     from urban_processing.params.subdivide import Strategy, SubdivideParams
@@ -38,8 +43,12 @@ _HOME = {
     "BlocksParams": "urban_processing.params.blocks",
     "CalibrateParams": "urban_processing.params.calibrate",
     "CogenerateParams": "urban_processing.params.cogenerate",
+    "CompareParams": "urban_processing.params.compare",
+    "GeoComparison": "urban_processing.io.measured",
+    "GeoFabric": "urban_processing.io.measured",
     "GeoLayers": "urban_processing.io.frames",
     "GeoLayout": "urban_processing.io.frames",
+    "MeasureParams": "urban_processing.params.measure",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
     "Strategy": "urban_processing.params.subdivide",
@@ -48,7 +57,9 @@ _HOME = {
     "TransferParams": "urban_processing.params.transfer",
     "calibrate": "urban_processing.api",
     "cogenerate": "urban_processing.api",
+    "compare": "urban_processing.api",
     "find_blocks": "urban_processing.api",
+    "measure": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
     "subdivide": "urban_processing.api",
@@ -59,8 +70,12 @@ __all__ = [
     "BlocksParams",
     "CalibrateParams",
     "CogenerateParams",
+    "CompareParams",
+    "GeoComparison",
+    "GeoFabric",
     "GeoLayers",
     "GeoLayout",
+    "MeasureParams",
     "OptimizeParams",
     "Preset",
     "Strategy",
@@ -70,8 +85,10 @@ __all__ = [
     "__version__",
     "calibrate",
     "cogenerate",
+    "compare",
     "errors",
     "find_blocks",
+    "measure",
     "optimize",
     "read_layout",
     "subdivide",

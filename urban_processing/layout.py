@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -228,6 +229,13 @@ class Layout:
         at_rim = mesh.face[np.repeat(mesh.edge_is_boundary, 2)]
         out[at_rim[at_rim != OUTSIDE]] = True
         return out
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the parcels and streets, for provenance."""
+        mesh = self.mesh
+        arrays = (mesh.xy, mesh.origin, mesh.next, mesh.face, self.edge_street)
+        return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
 def layout_from_mesh(

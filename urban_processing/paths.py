@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 
 GEOPACKAGE = ".gpkg"
@@ -51,7 +52,13 @@ def geopackage_problems(target: Path) -> list[str]:
 
 def map_problems(target: Path) -> list[str]:
     """Return why a map cannot be written to a path; nothing where it can."""
+    return ending_problems(target, "map", MAPS)
+
+
+def ending_problems(target: Path, what: str, endings: Collection[str]) -> list[str]:
+    """Return why a file of some kind cannot be written to a path; nothing where it can."""
     problems = file_problems(target)
-    if target.suffix.lower() not in MAPS:
-        problems.append(f"The map {target} must end in one of {', '.join(MAPS)}.")
+    if target.suffix.lower() not in endings:
+        one_of = "" if len(endings) == 1 else "one of "
+        problems.append(f"The {what} {target} must end in {one_of}{', '.join(endings)}.")
     return problems

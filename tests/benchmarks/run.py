@@ -24,7 +24,11 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-BOUNDARIES = sorted(path.stem for path in (ROOT / "sample_data").glob("*.gpkg"))
+BOUNDARIES = sorted(
+    path.stem
+    for path in (ROOT / "sample_data").glob("*.gpkg")
+    if not path.stem.startswith("streets_")
+)
 PATTERNS = ["loop", "cul-de-sac", "tree"]
 GROWTH_SIZES = [500, 1300, 3200, 8000, 20000]
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from urban_processing.layout import Layout, layout_from_mesh
 from urban_processing.mesh.build import mesh_from_polygons
+from urban_processing.mesh.overlap import covered_share, find_overlaps, segments_of
 from urban_processing.metrics.certificate import certificate
 from urban_processing.metrics.measures import LayoutMeasures, measure
-from urban_processing.metrics.overlap import covered_share, find_overlaps, segments_of
 from urban_processing.site import Frame
 from urban_processing.streets.classes import NodeKind
 from urban_processing.streets.network import street_network

@@ -330,6 +330,12 @@ def test_words_say_who_is_better_and_what_differs_most() -> None:
     )
 
 
+def test_words_of_a_single_value_name_no_interval() -> None:
+    many = list(np.linspace(10.0, 20.0, 60))
+    told = dict(words(compared(side("a", parcel_width_m=many), side("b", parcel_width_m=[90.0]))))
+    assert told["width of parcels"] == "75.0 m apart, median 90.0 in b, 15.0 in a"
+
+
 def test_words_do_not_count_interior_parcels_twice() -> None:
     values = {"irregularity": 0.3, "irregularity_interior": 0.3}
     worse = {"irregularity": 0.5, "irregularity_interior": 0.5}

@@ -81,6 +81,7 @@ def test_the_wheel_is_what_is_tested() -> None:
     with zipfile.ZipFile(WHEEL) as wheel:
         names = wheel.namelist()
     assert "urban_processing/py.typed" in names
+    assert {f"urban_processing/report/html/page.{end}" for end in ("css", "html.jinja")} <= {*names}
     assert not [name for name in names if "test" in name or name.endswith(".gpkg")]
     assert [name for name in names if name.endswith("licenses/LICENSE")]
     assert {name.split("/")[0] for name in names} == {

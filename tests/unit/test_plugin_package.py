@@ -21,7 +21,7 @@ import urban_processing
 
 ROOT = Path(__file__).resolve().parents[2]
 TOP = "urban_processing_qgis"
-ENGINE_NEEDS = {"matplotlib", "networkx", "numpy", "scipy", "shapely"}
+ENGINE_NEEDS = {"jinja2", "matplotlib", "networkx", "numpy", "scipy", "shapely"}
 QGIS_HAS = {"osgeo", "processing", "qgis"}
 
 pytestmark = pytest.mark.skipif(
@@ -74,9 +74,10 @@ def test_the_zip_has_one_folder_without_caches_and_binaries(
     zipped: bytes, texts: dict[str, str]
 ) -> None:
     assert {name.partition("/")[0] for name in texts} == {TOP}
-    assert {Path(name).suffix for name in texts} <= {".py", ".txt", ".svg", ""}
+    assert {Path(name).suffix for name in texts} <= {".py", ".txt", ".svg", ".css", ".jinja", ""}
     assert not [name for name in texts if "__pycache__" in name or "/." in name]
     assert f"{TOP}/__init__.py" in texts
+    assert f"{TOP}/engine/report/html/page.html.jinja" in texts
     assert f"{TOP}/build.py" not in texts
     assert len(zipped) < 1_000_000
 
@@ -142,12 +143,15 @@ sys.path.insert(0, {str(folder)!r})
 import shapely
 from {TOP}.engine.params import CogenerateParams
 from {TOP}.engine.pipelines.cogenerate import cogenerate
-from {TOP}.engine.metrics import MeasuredLayout
+from {TOP}.engine.metrics import LayoutMeasures, MeasuredLayout
 from {TOP}.engine.site import Site
 import {TOP}.engine.intake.sites, {TOP}.engine.layout_file.files, {TOP}.engine.report.map
+from {TOP}.engine.report.html import Report, report_html, report_side
 layout = cogenerate(Site((shapely.box(0, 0, 90, 90),)), CogenerateParams(parcels=9))
 assert MeasuredLayout(layout).certificate.holds
 assert layout.mesh.n_faces == 9
+known = LayoutMeasures(layout).of_fabric
+assert "</html>" in report_html(Report((report_side(known, name="nine", samples={{}}),)))
 tops = {{name.partition(".")[0] for name in sys.modules}}
 print(sorted(tops & {{"urban_processing", "geopandas", "pyproj", "pyogrio", "click"}}))
 """

@@ -16,7 +16,7 @@ from lands import LANDS, site_of
 from urban_processing.errors import ParameterError
 from urban_processing.io.files import read_layout, write_layout
 from urban_processing.io.frames import GeoLayout
-from urban_processing.layout import Layout
+from urban_processing.layout import NOT_FIXED, EdgeKind, GivenStreet, Layout
 from urban_processing.metrics import LayoutMeasures, certificate, layout_tables, measure
 from urban_processing.metrics.certificate import certify
 from urban_processing.metrics.tables import (
@@ -360,3 +360,22 @@ def test_rules_survive_a_file_and_its_age() -> None:
     assert StreetRules.from_dict(rules.as_dict()) == rules
     assert StreetRules.from_dict({"rim": 3.0, "of_later_versions": 1}).rim == 3.0
     assert set(rules.width_m) == {c.value for c in StreetClass}
+
+
+def test_widths_of_given_streets_are_heeded_on_one_mesh() -> None:
+    layout = grid(4, 2, [(2, 0), (2, 2)])
+    fixed = np.where(layout.edge_street & (layout.edge_kind == EdgeKind.INTERIOR), 0, NOT_FIXED)
+    rules = dataclasses.replace(layout.street_rules, laid_out=True)
+    taken = [
+        shapely.area(
+            lay_out_rights_of_way(
+                layout.replace(
+                    edge_fixed=fixed,
+                    fixed_streets=(GivenStreet("lane", width),),
+                    street_rules=rules,
+                )
+            ).polygons
+        ).sum()
+        for width in (4.0, 8.0)
+    ]
+    assert taken[1] > taken[0] + 1.0

@@ -37,7 +37,7 @@ LAYOUT_OUTPUTS = _with_views(
 
 
 def layer_outputs(
-    what: str, *, label: str, help: str, layers: tuple[Layer, ...]
+    what: str, *, label: str, help: str, layers: tuple[Layer, ...], required: bool = True
 ) -> tuple[Output, ...]:
     """Return a set of layers and the views of it; `what` names it in a sentence."""
     whole = Output(
@@ -45,7 +45,33 @@ def layer_outputs(
         kind=OutputKind.LAYERS,
         label=label,
         help=help,
-        required=True,
+        required=required,
         layers=layers,
     )
     return _with_views(whole, what)
+
+
+def report_outputs(what: str) -> tuple[Output, ...]:
+    """Return a report and its figures for machines; `what` says in a sentence what it is on."""
+    return (
+        Output(
+            name="report",
+            kind=OutputKind.REPORT,
+            label="Report",
+            help=f"A page of HTML on {what}: maps, tables, distributions, glossary.",
+        ),
+        Output(
+            name="json",
+            kind=OutputKind.JSON,
+            label="Figures as JSON",
+            help="All figures of the report, for programs.",
+            of="report",
+        ),
+        Output(
+            name="csv",
+            kind=OutputKind.CSV,
+            label="Metrics as CSV",
+            help="The table of metrics, for spreadsheets.",
+            of="report",
+        ),
+    )

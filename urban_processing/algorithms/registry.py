@@ -7,14 +7,26 @@ import difflib
 from urban_processing.algorithms.blocks import BLOCKS
 from urban_processing.algorithms.calibrate import CALIBRATE
 from urban_processing.algorithms.cogenerate import COGENERATE
+from urban_processing.algorithms.compare import COMPARE
 from urban_processing.algorithms.export import EXPORT
+from urban_processing.algorithms.measure import MEASURE
 from urban_processing.algorithms.optimize import OPTIMIZE
 from urban_processing.algorithms.spec import AlgorithmSpec
 from urban_processing.algorithms.subdivide import SUBDIVIDE
 from urban_processing.algorithms.transfer import TRANSFER_SPEC
 from urban_processing.errors import ParameterError
 
-_SPECS = (COGENERATE, OPTIMIZE, BLOCKS, SUBDIVIDE, CALIBRATE, TRANSFER_SPEC, EXPORT)
+_SPECS = (
+    COGENERATE,
+    OPTIMIZE,
+    BLOCKS,
+    SUBDIVIDE,
+    CALIBRATE,
+    TRANSFER_SPEC,
+    MEASURE,
+    COMPARE,
+    EXPORT,
+)
 
 
 def specs() -> tuple[AlgorithmSpec, ...]:

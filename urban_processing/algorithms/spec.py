@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from urban_processing.params.base import ParamField, Params
+from urban_processing.paths import GEOPACKAGE, MAPS
 from urban_processing.schema import Layer
 
 
@@ -65,6 +66,15 @@ class InputKind(enum.StrEnum):
     SUBDIVISION = "subdivision"
     """A subdivision made before, as a file; handed over as `Previous`."""
 
+    FABRIC = "fabric"
+    """Land with streets and parcels, of any origin, as a file; handed over as a `Fabric`. Layers
+    of parcels, streets and land stand for it, too."""
+    FABRICS = "fabrics"
+    """Several of these; handed over as `ComparedFabrics`, with what is there as one of them if
+    layers of parcels or streets, or OpenStreetMap, are given besides."""
+    OPEN_STREET_MAP = "OpenStreetMap"
+    """Streets of OpenStreetMap, from an extract or from its server."""
+
     @property
     def of_site(self) -> str:
         """Name of the argument of `read_boundary` that takes such an input; empty for others."""
@@ -73,7 +83,7 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
-        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
+        return self.chooses_crs or self in (InputKind.PARCELS_BEFORE, InputKind.FABRIC)
 
     @property
     def chooses_crs(self) -> bool:
@@ -108,11 +118,32 @@ class OutputKind(enum.StrEnum):
     EXPORT = "export"
     """A folder of plain files: of what is named in `Output.of`, or of the `Layout` that an
     algorithm returns; then the algorithm has the parameters of `ExportParams`."""
+    REPORT = "report"
+    """A `Report`: a page of HTML with maps, tables and a glossary."""
+    JSON = "JSON"
+    """The figures of the report named in `Output.of`, as JSON."""
+    CSV = "CSV"
+    """The metrics of that report as a table."""
 
     @property
     def is_geopackage(self) -> bool:
         """Whether it is stored as one file with several layers."""
         return self in (OutputKind.LAYOUT, OutputKind.LAYERS)
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """What names of its files end in; nothing for a folder."""
+        return _ENDINGS.get(self, ())
+
+
+_ENDINGS = {
+    OutputKind.LAYOUT: (GEOPACKAGE,),
+    OutputKind.LAYERS: (GEOPACKAGE,),
+    OutputKind.MAP: MAPS,
+    OutputKind.REPORT: (".html",),
+    OutputKind.JSON: (".json",),
+    OutputKind.CSV: (".csv",),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,9 +271,10 @@ class AlgorithmSpec:
         if twice:
             raise ValueError(f"{self.name}: names used twice: {', '.join(twice)}")
         made = {output.name for output in self.outputs if not output.of}
-        bare = [o.name for o in self.outputs if bool(o.of) == bool(o.layers)]
+        without = [bool(o.of) or o.kind is OutputKind.REPORT for o in self.outputs]
+        bare = [o.name for o, w in zip(self.outputs, without, strict=True) if w == bool(o.layers)]
         if bare:
-            raise ValueError(f"{self.name}: all but views have layers: {', '.join(bare)}")
+            raise ValueError(f"{self.name}: all but views and reports have layers: {bare}")
         lost = [output.name for output in self.outputs if output.of and output.of not in made]
         if lost:
             raise ValueError(f"{self.name}: views of no output: {', '.join(lost)}")

@@ -1,6 +1,16 @@
-"""The library in one call each: land to layouts, streets to blocks, blocks to parcels."""
+"""The library in one call each: land to layouts, streets to blocks, blocks to parcels, figures."""
 
 from urban_processing.api.blocks import calibrate, find_blocks, subdivide, transfer
 from urban_processing.api.layouts import cogenerate, optimize
+from urban_processing.api.measuring import compare, measure
 
-__all__ = ["calibrate", "cogenerate", "find_blocks", "optimize", "subdivide", "transfer"]
+__all__ = [
+    "calibrate",
+    "cogenerate",
+    "compare",
+    "find_blocks",
+    "measure",
+    "optimize",
+    "subdivide",
+    "transfer",
+]

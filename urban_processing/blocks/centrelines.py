@@ -30,6 +30,7 @@ def clean_centrelines(
     snap: float,
     dead_ends: bool,
     land: Sequence[shapely.Polygon] | None = None,
+    short_ends: bool = False,
 ) -> tuple[Centrelines, list[Issue]]:
     """Node lines, and mend what is not as a network of streets is.
 
@@ -46,6 +47,9 @@ def clean_centrelines(
         Whether streets stay that lead to nothing.
     land
         Land that is looked at: ends on its rim and outside are no dead ends.
+    short_ends
+        Whether dead ends stay that end within the right-of-way of the street that they leave, if
+        they are no shorter than `snap`.
     """
     issues: list[Issue] = []
     rows = np.flatnonzero(_worth_keeping(streets.lines, snap, issues))
@@ -54,7 +58,8 @@ def clean_centrelines(
     work = replace(work, line=rows[work.line])
     issues += _crossings(work, lines)
     _tell_doubled(lines, work, snap, issues)
-    work = _without_stubs(work, streets.width, snap, issues)
+    reach = np.zeros(len(streets)) if short_ends else streets.width / 2
+    work = _without_stubs(work, reach, snap, issues)
     work = _joined(work, streets.width, snap, issues)
     return _dead_ends(work, issues, kept=dead_ends, within=_interior(land, snap)), issues
 
@@ -106,13 +111,13 @@ def _tell_doubled(
 
 
 def _without_stubs(
-    work: Centrelines, width: FloatArray, snap: float, issues: list[Issue]
+    work: Centrelines, reach: FloatArray, snap: float, issues: list[Issue]
 ) -> Centrelines:
-    """Take away dead ends that go no further than the right-of-way of the street they leave."""
-    widths = width[work.line]
+    """Take away dead ends that go no further than a line (n,) reaches that they leave."""
+    reaches = reach[work.line]
     stubs = []
-    for end, walk in _walks(work, max(snap, widths.max(initial=0.0) / 2)).items():
-        within = max(snap, widths[walk.onward].max(initial=0.0) / 2)
+    for end, walk in _walks(work, max(snap, reaches.max(initial=0.0))).items():
+        within = max(snap, reaches[walk.onward].max(initial=0.0))
         if walk.stopped and walk.length < within:
             stubs.append((end, walk.segments))
     if not stubs:
@@ -120,10 +125,8 @@ def _without_stubs(
     kept = np.ones(len(work.line), dtype=bool)
     for _, segments in stubs:
         kept[segments] = False
-    message = (
-        f"{len(stubs)} dead end(s) shorter than {snap:g} m, or within the right-of-way of the "
-        "street that they leave, were left out."
-    )
+    more = ", or within the right-of-way of the street that they leave," if reach.any() else ""
+    message = f"{len(stubs)} dead end(s) shorter than {snap:g} m{more} were left out."
     places = _places(work.node_xy[[end for end, _ in stubs]])
     issues.append(
         Issue("stubs_left_out", message, value=float(len(stubs)), limit=snap, geometry=places)

@@ -54,7 +54,7 @@ class Centrelines:
     def cut_at(self, edges: npt.NDArray[np.object_]) -> Centrelines:
         """Return the pieces of noded lines that lie on the segments."""
         lines = np.asarray(shapely.linestrings(self.segments), dtype=object)
-        segments, of = _pieces_on(edges, lines, np.zeros(len(lines)))
+        segments, of = pieces_on(edges, lines, np.zeros(len(lines)))
         return _sorted(segments, self.line[of])
 
     def take(self, kept: BoolArray) -> Centrelines:
@@ -67,10 +67,10 @@ def node_lines(lines: npt.NDArray[np.object_], width: FloatArray) -> Centrelines
     if not len(lines):
         return Centrelines(np.empty((0, 2, 2)), np.empty(0, dtype=np.int64))
     edges = shapely.get_parts(shapely.union_all(lines, grid_size=NODE_GRID))
-    return _sorted(*_pieces_on(edges, lines, width))
+    return _sorted(*pieces_on(edges, lines, width))
 
 
-def _pieces_on(
+def pieces_on(
     edges: npt.NDArray[np.object_], lines: npt.NDArray[np.object_], width: FloatArray
 ) -> tuple[FloatArray, IntArray]:
     """Pieces of noded lines that lie on some lines, and which: of several the widest.

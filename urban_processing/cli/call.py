@@ -9,7 +9,7 @@ from typing import Any
 
 from urban_processing.algorithms.spec import AlgorithmSpec, Output
 from urban_processing.cli import stores
-from urban_processing.cli.readers import READERS, values_given
+from urban_processing.cli.readers import READERS, named_file, values_given
 from urban_processing.errors import UrbanError
 from urban_processing.params.base import Params, option_name
 
@@ -52,9 +52,9 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
 def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]:
     problems: list[str] = []
     taken = {
-        Path(given[item.name]).resolve(): f"the input {given[item.name]}"
+        Path(path).resolve(): f"the input {path}"
         for item in spec.inputs
-        if given[item.name] is not None
+        for path in _paths(given[item.name])
     }
     for output in spec.outputs:
         path = given[output.name]
@@ -72,6 +72,15 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
             )
         taken.setdefault(place, _flags(output))
     return problems
+
+
+def _paths(given: Any) -> tuple[str, ...]:
+    """Files that were given for an input, names of sides taken off."""
+    if given is None:
+        return ()
+    if isinstance(given, tuple):
+        return tuple(named_file(text)[1] for text in given)
+    return (given,)
 
 
 def _flags(output: Output) -> str:

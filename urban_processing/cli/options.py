@@ -119,10 +119,18 @@ _BY_OPTION = (
 def _input_parameters(item: Input) -> list[click.Parameter]:
     if item.kind.of_site or item.kind in _BY_OPTION:
         return [_file(f"--{option_name(item.name)}", panel=INPUT, help=item.help)]
+    if item.kind is InputKind.OPEN_STREET_MAP:
+        fetch = "Fetch it from OpenStreetMap's server, within the land; kept for the next time."
+        return [
+            _file(f"--{option_name(item.name)}", panel=INPUT, help=item.help),
+            _option("--osm", is_flag=True, panel=INPUT, help=fetch),
+        ]
+    several = item.kind is InputKind.FABRICS
     argument = HelpArgument(
         [item.name],
         required=False,
         type=click.Path(),
+        nargs=-1 if several else 1,
         metavar=option_name(item.name).upper(),
         help=item.help,
     )
@@ -175,8 +183,10 @@ def _output_options(output: Output, *, of_layout: bool) -> list[click.Parameter]
     flag = f"--{option_name(output.name)}"
     if output.kind.is_geopackage:
         return [_file("-o", flag, panel=OUTPUT, help=output.help, note=".gpkg")]
-    if output.kind is OutputKind.MAP:
-        return [_file(flag, panel=OUTPUT, help=output.help, note=".png, .svg or .pdf")]
+    if output.kind.endings:
+        *others, last = output.kind.endings
+        note = f"{', '.join(others)} or {last}" if others else last
+        return [_file(flag, panel=OUTPUT, help=output.help, note=note)]
     folder = {"metavar": "FOLDER", "panel": OUTPUT, "help": output.help}
     if not output.of:  # the format is a parameter of the algorithm
         return [_file("-o", flag, **folder)]

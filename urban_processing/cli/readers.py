@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 from urban_processing.algorithms.choices import layout_problems
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind
 from urban_processing.errors import DependencyError, UrbanError
 from urban_processing.params.base import Params, option_name
+from urban_processing.params.compare import CompareParams
+from urban_processing.params.measure import MeasureParams
 from urban_processing.params.subdivide import SubdivideParams
 
 P = TypeVar("P", bound=Params)
@@ -207,6 +210,80 @@ def _read_subdivision(
     return read_subdivision(given[item.name])
 
 
+@_collecting
+def _read_fabric(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read what is measured, from its file or from layers."""
+    parcels, streets, land = _layers_of(spec, given)
+    flags = "--parcel-layer and --street-layer"
+    if given[item.name] is not None and (parcels is not None or streets is not None):
+        problems.append(f"Give {option_name(item.name).upper()}, or {flags}, not both.")
+        return None
+    if given[item.name] is None and parcels is None and streets is None:
+        problems.append(
+            f"Give {option_name(item.name).upper()}, {_lower_first(item.help).rstrip('.')}; "
+            f"or layers with {flags}."
+        )
+        return None
+    params = _usable(MeasureParams, values_given(spec, given))
+    if params is None:
+        return None
+    from urban_processing.io.fabrics import read_fabric
+
+    return read_fabric(given[item.name], parcels=parcels, streets=streets, land=land, params=params)
+
+
+@_collecting
+def _read_fabrics(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read what is compared: files, and what is there."""
+    named = [named_file(text) for text in given[item.name]]
+    if not named:
+        problems.append(
+            f"Give {option_name(item.name).upper()}, one file or more, to compare with each other "
+            "or with what is there."
+        )
+        return None
+    parcels, streets, land = _layers_of(spec, given)
+    if given["osm"] and given["osm_file"] is not None:
+        problems.append("Give --osm or --osm-file, not both.")
+        return None
+    params = _usable(CompareParams, values_given(spec, given))
+    if params is None:
+        return None
+    from urban_processing.io.comparison import read_compared
+
+    return read_compared(
+        named,
+        parcels=parcels,
+        streets=streets,
+        land=land,
+        osm_file=given["osm_file"],
+        osm=given["osm"],
+        params=params,
+    )
+
+
+def _layers_of(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[Any]:
+    """Parcels, streets and land that were given as layers."""
+    kinds = (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER, InputKind.LAND)
+    return [next((given[i.name] for i in spec.inputs if i.kind is kind), None) for kind in kinds]
+
+
+def named_file(text: str) -> tuple[str, str]:
+    """Name of a side, empty where none is given, and its file, from ``NAME=FILE`` or a file.
+
+    >>> named_file("loops=a.gpkg"), named_file("a.gpkg")
+    (('loops', 'a.gpkg'), ('', 'a.gpkg'))
+    """
+    name, sign, path = text.partition("=")
+    if not sign or Path(text).exists() or "|" in name or "/" in name:
+        return "", text
+    return name.strip(), path
+
+
 def _usable(params: type[P], values: Mapping[str, Any]) -> P | None:
     """The parameters that bounds in layers are checked against; None where they are wrong."""
     return None if params.problems_with(values) else params.from_values(values)
@@ -233,6 +310,8 @@ READERS: Mapping[InputKind, Reader] = {
     InputKind.OBSERVED_PARCELS: _read_observed,
     InputKind.SUBDIVISION: _read_subdivision,
     InputKind.PARCELS_BEFORE: _read_editions,
+    InputKind.FABRIC: _read_fabric,
+    InputKind.FABRICS: _read_fabrics,
 }
 """What reads an input of a kind; inputs of other kinds are read together with one of these."""
 

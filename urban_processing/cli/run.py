@@ -23,6 +23,9 @@ _FILE_NAMES = {
     OutputKind.LAYERS: "layers",
     OutputKind.MAP: "picture",
     OutputKind.EXPORT: "export",
+    OutputKind.REPORT: "report",
+    OutputKind.JSON: "JSON",
+    OutputKind.CSV: "CSV",
 }
 
 

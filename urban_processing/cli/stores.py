@@ -21,10 +21,11 @@ def problems(output: Output, whole: Output, given: Mapping[str, Any]) -> list[st
         from urban_processing.layout_file.writing import check_output
 
         return check_output(path, overwrite=overwrite)
-    if output.kind is OutputKind.MAP:
-        from urban_processing.paths import map_problems
+    if output.kind.endings:
+        from urban_processing.paths import ending_problems
 
-        return [*map_problems(path), *_in_the_way(path, overwrite)]
+        wrong = ending_problems(path, output.kind.value, output.kind.endings)
+        return [*wrong, *_in_the_way(path, overwrite)]
     from urban_processing.io.exports import check_export
 
     kind = _kind(output, given)
@@ -49,6 +50,8 @@ def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
     if output.kind is OutputKind.MAP:
         _plot(made, path)
         return path
+    if output.kind in (OutputKind.REPORT, OutputKind.JSON, OutputKind.CSV):
+        return _write_report(output, made, path, overwrite=overwrite)
     from urban_processing.io.exports import export_layers, export_layout
     from urban_processing.tables import LayerSet
 
@@ -56,6 +59,17 @@ def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
     if isinstance(made, LayerSet):
         return export_layers(made.layers(), path, crs=made.frame.crs, **how)
     return export_layout(made, path, **how)
+
+
+def _write_report(output: Output, made: Any, path: Path, *, overwrite: bool) -> Path:
+    from urban_processing.report.html import write_csv, write_json, write_report
+
+    writers = {
+        OutputKind.REPORT: write_report,
+        OutputKind.JSON: write_json,
+        OutputKind.CSV: write_csv,
+    }
+    return writers[output.kind](made, path, overwrite=overwrite)
 
 
 def _plot(made: Any, path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urban_processing.schema import Column, ColumnType, GeometryType, Layer
+from urban_processing.schema import PROVENANCE, Column, ColumnType, GeometryType, Layer
 
 
 def _text(name: str, alias: str, description: str, *, nullable: bool = False) -> Column:
@@ -66,11 +66,19 @@ DISTANCES = Layer(
             "Wasserstein distance of order 1, on a circle for bearings: how far values are to be "
             "moved in the mean to make one distribution the other.",
         ),
-        _number("wasserstein_low", "From", "Lower end of its confidence interval (bootstrap)."),
-        _number("wasserstein_high", "To", "Upper end of its confidence interval (bootstrap)."),
+        _number(
+            "wasserstein_low",
+            "Wasserstein, from",
+            "Lower end of its confidence interval (bootstrap).",
+        ),
+        _number(
+            "wasserstein_high",
+            "Wasserstein, to",
+            "Upper end of its confidence interval (bootstrap).",
+        ),
         _number(
             "wasserstein_noise",
-            "Chance",
+            "Wasserstein, by chance",
             "Wasserstein distance that two samples of these sizes have by chance, both drawn from "
             "all values together; exceeded in half of (1 - confidence) of cases.",
         ),
@@ -80,9 +88,19 @@ DISTANCES = Layer(
             "Largest difference of the distribution functions, between 0 and 1; for bearings "
             "Kuiper's statistic, the largest difference above plus the largest below.",
         ),
-        _number("ks_low", "From", "Lower end of its confidence interval (bootstrap)."),
-        _number("ks_high", "To", "Upper end of its confidence interval (bootstrap)."),
-        _number("ks_noise", "Chance", "The same statistic that two such samples have by chance."),
+        _number(
+            "ks_low",
+            "Kolmogorov-Smirnov, from",
+            "Lower end of its confidence interval (bootstrap).",
+        ),
+        _number(
+            "ks_high", "Kolmogorov-Smirnov, to", "Upper end of its confidence interval (bootstrap)."
+        ),
+        _number(
+            "ks_noise",
+            "Kolmogorov-Smirnov, by chance",
+            "The same statistic that two such samples have by chance.",
+        ),
         Column(
             "more_than_noise",
             ColumnType.BOOLEAN,
@@ -95,3 +113,8 @@ DISTANCES = Layer(
     shown=True,
 )
 """One row for each distribution and each layout but the reference."""
+
+COMPARED: tuple[Layer, ...] = (COMPARISON, DISTANCES, PROVENANCE)
+"""Layers that a comparison has."""
+
+COMPARISON_KIND = "comparison"

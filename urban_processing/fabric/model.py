@@ -13,10 +13,14 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.provenance import Step
 from urban_processing.site import Frame, Issue
+from urban_processing.streets.block_length import BlockSides
 from urban_processing.streets.network_model import Linework, StreetNetwork
 
 NO_BLOCK = -1
 """`FabricParcels.block` of a parcel that lies in no block."""
+
+REAL = "real"
+"""What the side of a comparison is called that is there."""
 
 UNKNOWN_LEVEL = -1
 """`FabricParcels.level` of a parcel that was not made by cuts."""
@@ -96,7 +100,7 @@ class FabricParcels:
     net_area
         (F,) area in m² less right-of-way, NaN where no right-of-way is known.
     neighbours
-        (F,) number of other parcels with which it shares a line of its boundary.
+        (F,) number of other parcels with which it shares a line of its boundary that is no street.
     fronts
         Its frontage, piece by piece.
     """
@@ -126,10 +130,13 @@ class FabricBlocks:
         (B,) their outlines.
     part
         (B,) piece of the land that each lies in.
+    sides
+        Their longest sides, where they are known already.
     """
 
     polygons: Geometries
     part: IntArray
+    sides: BlockSides | None = None
 
     def __len__(self) -> int:
         """Return the number of blocks."""

@@ -21,6 +21,7 @@ from urban_processing.intake.block_values import BLOCK_ID, block_values
 from urban_processing.intake.crs_choice import CrsLibrary
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import layers_digest
+from urban_processing.intake.numbers import numbered
 from urban_processing.intake.polygons import CleanedEach, clean_each
 from urban_processing.intake.projection import Projection
 from urban_processing.intake.street_lines import (
@@ -295,27 +296,12 @@ def _overlap_problems(
 def _numbered(
     polygons: ObjectArray, row: IntArray, given_id: IntArray | None, issues: list[Issue]
 ) -> tuple[IntArray, IntArray]:
-    """Numbers of the blocks, ascending, and the block of each.
-
-    They are those given, or else count the blocks by place. Of several pieces of one row the
-    largest keeps its number, the others get new ones.
-    """
-    west, south, east, north = shapely.bounds(polygons).T
-    by_place = np.lexsort((shapely.area(polygons), north, east, south, west))
-    size = np.round(shapely.area(polygons[by_place]), 6)
-    largest = by_place[np.lexsort((np.arange(len(size)), -size, row[by_place]))]
-    _, first = np.unique(row[largest], return_index=True)
-    extra = len(polygons) - len(first)
+    """Numbers of the blocks, ascending, and the block of each; see `numbered`."""
+    number, order, extra = numbered(polygons, row, given_id)
     if extra:
         message = f"{extra} block(s) more than rows: polygons in several pieces are several blocks."
         issues.append(Issue("blocks_of_parts", message, value=float(extra)))
-    if given_id is None:
-        return np.arange(1, len(polygons) + 1), by_place
-    keeps = np.isin(by_place, largest[first])
-    number = np.where(keeps, given_id[row[by_place]], 0)
-    number[~keeps] = max(0, int(given_id[row].max())) + 1 + np.arange(extra)
-    order = np.argsort(number, kind="stable")
-    return number[order], by_place[order]
+    return number, order
 
 
 def _with_streets(

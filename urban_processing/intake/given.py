@@ -36,7 +36,7 @@ relative to √area of the land."""
 
 CLASS_COLUMNS = ("class", "street_class")
 WIDTH_COLUMNS = ("width_m", "width")
-USE_COLUMNS = ("land_use", "use")
+USE_COLUMNS = ("land_use", "landuse", "use")
 """Attributes that are looked for, the first that is there is taken."""
 
 GIVEN_COLUMNS = (*CLASS_COLUMNS, *WIDTH_COLUMNS, *USE_COLUMNS)

@@ -226,7 +226,7 @@ def _choose_layer(path: str, layer: str | None, wanted: str) -> str:
             raise BoundaryError(f"{path} has no layer {layer!r}; its layers are {_listed(names)}.")
         return layer
     spatial = [str(name) for name, kind in layers if kind is not None]
-    fitting = [str(name) for name, kind in layers if kind is not None and _may_hold(kind, wanted)]
+    fitting = [str(name) for name, kind in layers if kind is not None and may_hold(kind, wanted)]
     candidates = fitting or spatial or names
     if wanted == "polygon" and _PREFERRED_LAYER in candidates:
         return _PREFERRED_LAYER
@@ -247,7 +247,7 @@ _HOLDING = {
 }
 
 
-def _may_hold(kind: str, wanted: str) -> bool:
+def may_hold(kind: str, wanted: str) -> bool:
     """Whether a layer of a kind may hold the wanted geometries."""
     words = (*_HOLDING[wanted], "Unknown", "Collection")
     fits = any(word in kind for word in words)

@@ -38,6 +38,12 @@ CREATE TABLE "layer_styles" (
   "update_time" DATETIME)
 """
 
+_EXTENSION_TABLE = """
+CREATE TABLE IF NOT EXISTS gpkg_extensions (
+  table_name TEXT, column_name TEXT, extension_name TEXT NOT NULL, definition TEXT NOT NULL,
+  scope TEXT NOT NULL, CONSTRAINT ge_tce UNIQUE (table_name, column_name, extension_name))
+"""
+
 _METADATA_TABLES = """
 CREATE TABLE gpkg_metadata (
   id INTEGER CONSTRAINT m_pk PRIMARY KEY ASC NOT NULL,
@@ -184,6 +190,8 @@ def _write_state(connection: sqlite3.Connection, standard: str, state: str) -> N
 def _register(
     connection: sqlite3.Connection, extension: str, definition: str, *, tables: tuple[str, ...]
 ) -> None:
+    # GDAL makes it together with a spatial index, so not where no layer has geometries
+    connection.execute(_EXTENSION_TABLE)
     connection.executemany(
         "INSERT INTO gpkg_extensions VALUES (?, NULL, ?, ?, 'read-write')",
         [(table, extension, definition) for table in tables],

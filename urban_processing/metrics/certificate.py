@@ -13,15 +13,15 @@ from scipy.sparse.csgraph import connected_components
 
 from urban_processing.access_rule import reached_frontage
 from urban_processing.layout import Layout
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
-from urban_processing.mesh.touches import joined_at_touches
-from urban_processing.metrics.overlap import (
+from urban_processing.mesh.overlap import (
     Segments,
     covered_share,
     find_overlaps,
     segments_of,
     unmatched_segments,
 )
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.touches import joined_at_touches
 from urban_processing.metrics.tables import (
     boundary_table,
     net_parcel_table,

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from urban_processing.fabric.comparison_layers import COMPARISON, DISTANCES
+from urban_processing.fabric.comparison_layers import COMPARISON, COMPARISON_KIND, DISTANCES
 from urban_processing.metrics.comparison import Comparison
+from urban_processing.metrics.comparison_words import words
+from urban_processing.provenance import Step
 from urban_processing.schema import Layer
-from urban_processing.tables import Table, make_table, objects
+from urban_processing.site import Frame
+from urban_processing.tables import LayerSet, Table, make_table, objects
+
+
+def comparison_set(comparison: Comparison, *, history: tuple[Step, ...] = ()) -> LayerSet:
+    """Return a comparison as layers, none of which has geometries, with a summary."""
+    return LayerSet(
+        kind=COMPARISON_KIND,
+        tables=comparison_layers(comparison),
+        frame=Frame(),
+        history=history,
+        summary=words(comparison),
+    )
 
 
 def comparison_layers(comparison: Comparison) -> dict[Layer, Table]:

@@ -46,8 +46,9 @@ def _in_words(d: DistributionDistance, n_sides: int) -> str:
         f" {d.distribution.unit}" if d.distribution.unit not in ("", "°") else d.distribution.unit
     )
     who = f"{d.side}: " if n_sides > 2 else ""
-    low, high = _short(d.wasserstein_low), _short(d.wasserstein_high)
-    sure = "" if math.isnan(d.wasserstein_low) else f" ({low} to {high})"
+    sure = ""
+    if not math.isnan(d.wasserstein_low):
+        sure = f" ({_short(d.wasserstein_low)} to {_short(d.wasserstein_high)})"
     text = f"{who}{_short(d.wasserstein)}{unit} apart{sure}"
     if math.isnan(d.median_side):
         return text

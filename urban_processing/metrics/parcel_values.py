@@ -48,7 +48,7 @@ def parcel_values(
         "irregularity_mean": mean(irregularity),
         "irregularity_max": highest(irregularity),
         "irregular_pct": percent(irregularity > IRREGULAR),
-        "unreached": int((~p.reached[chosen]).sum()),
+        "unreached": math.nan if np.isnan(frontage).any() else int((~p.reached[chosen]).sum()),
         "frontage_mean_m": mean(frontage),
         "frontage_min_m": lowest(frontage),
         **_proportions(p, chosen),

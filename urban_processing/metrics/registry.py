@@ -132,7 +132,10 @@ METRICS: tuple[MetricSpec, ...] = (
     ),
     _parcels("undesirable", "", _YANG, "Parcels with p_angle above 15° or p_area above 1.2."),
     _parcels(
-        "neighbours_mean", "", "Vanegas 2012, section 6", "Mean number of parcels beside a parcel."
+        "neighbours_mean",
+        "",
+        "Vanegas 2012, section 6",
+        "Mean number of parcels beside a parcel, with no street between.",
     ),
     _parcels("through_lots", "", "", "Parcels with frontage on two opposite sides."),
     _parcels(
@@ -214,30 +217,42 @@ METRICS: tuple[MetricSpec, ...] = (
         "intersections",
         "",
         "",
-        "Places inside the land where three or more street segments meet.",
+        "Places where three or more segments end, those on rim streets and at entries left out.",
     ),
     MetricSpec(
-        "intersections_per_km2", "/km²", _YANG, "s_i: intersections for each square kilometre."
+        "intersections_per_km2",
+        "/km²",
+        _YANG,
+        "s_i: intersections for each square kilometre of land.",
     ),
-    MetricSpec("intersections_3_pct", "%", "", "Share of intersections with three arms."),
-    MetricSpec("intersections_4_pct", "%", "", "Share of intersections with four arms."),
-    MetricSpec("intersections_5_pct", "%", "", "Share of intersections with five or more arms."),
+    MetricSpec("intersections_3_pct", "%", "", "Share of intersections where three segments end."),
+    MetricSpec("intersections_4_pct", "%", "", "Share of intersections where four segments end."),
     MetricSpec(
-        "dead_ends", "", "", "Street ends inside the land; streets cut at its rim are none."
+        "intersections_5_pct", "%", "", "Share of intersections where five or more segments end."
     ),
-    MetricSpec("dead_ends_per_km2", "/km²", _YANG, "s_d: dead ends for each square kilometre."),
+    MetricSpec(
+        "dead_ends",
+        "",
+        "",
+        "Places where a single segment ends, those on rim streets and at entries, where streets go "
+        "on outside, left out.",
+    ),
+    MetricSpec(
+        "dead_ends_per_km2", "/km²", _YANG, "s_d: dead ends for each square kilometre of land."
+    ),
     MetricSpec(
         "segment_length_mean_m",
         "m",
         "",
-        "Mean length of a segment: a street without the rim from one intersection, dead end or "
-        "place on the rim to the next.",
+        "Mean length of a segment: a street without the rim from one intersection, dead end, "
+        "entry or place on the rim to the next.",
     ),
     MetricSpec(
         "circuity",
         "",
         _BOEING,
-        "Length of all segments over that of the straight lines between their ends.",
+        "Length of all segments over that of the straight lines between their ends, segments that "
+        "end where they begin left out.",
         better=_LOW,
     ),
     MetricSpec(
@@ -257,38 +272,47 @@ METRICS: tuple[MetricSpec, ...] = (
         "meshedness",
         "",
         "Buhl et al. 2006",
-        "Independent loops of segments over the most that a planar network of as many nodes can "
-        "have: 0 for a tree.",
+        "Loops of streets without the rim (segments less their ends plus connected pieces) over "
+        "twice the ends less 5: 0 for a tree, 0.5 for an endless square grid.",
         better=_HIGH,
+    ),
+    MetricSpec(
+        "network_pieces",
+        "",
+        "",
+        "Connected pieces of the street network, rim streets included: 1 where every street leads "
+        "to every other.",
     ),
     MetricSpec(
         "network_detour",
         "",
         "",
-        "Mean over pairs of intersections and dead ends of the way along streets over the straight "
-        "line.",
+        "Mean over pairs of intersections, dead ends, entries and junctions with the rim of the "
+        "shortest way along streets, rim streets included, over the straight line.",
         better=_LOW,
     ),
     _parcels(
         "rim_distance_m",
         "m",
         "",
-        "Mean way along streets from a parcel to the rim of the land; every metre of frontage "
-        "counts alike.",
+        "Mean over parcels of the shortest way along streets from their frontage, every metre of "
+        "it counted alike, to the nearest rim street or entry.",
     ),
     _parcels(
         "parcel_distance_m",
         "m",
         "",
-        "Mean way along streets from parcel to parcel in one piece of the land.",
+        "Mean over pairs of parcels that streets connect (of thousands, over a sample that is "
+        "spread evenly) of the shortest way along streets, rim streets included, from frontage to "
+        "frontage, every metre of it counted alike.",
         _LOW,
     ),
     _parcels(
         "parcel_detour",
         "",
         "",
-        "Mean over pairs of parcels of the way along streets over the straight line between their "
-        "frontages.",
+        "Mean over the same pairs of the way along streets over the straight line, frontages "
+        "within a metre of each other left out.",
         _LOW,
     ),
 )

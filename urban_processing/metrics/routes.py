@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
+import shapely
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -16,14 +16,21 @@ from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.metrics.averages import in_part
 from urban_processing.streets.classes import NodeKind
 
-MOST_SOURCES = 256
-"""Ways begin at no more parcels, or nodes, than these, spread evenly over the land."""
-
-LEAST_SOURCES = 16
-"""Or at so many in each piece of the land, where that is more."""
-
 MOST_PAIRS = 8_000_000
-"""Pairs of pieces of frontage between which ways are worked out."""
+"""Ways are worked out between all pairs of pieces of frontage, if there are no more than these;
+else they begin at fewer parcels, spread evenly over the land and standing for the others."""
+
+MOST_NODE_PAIRS = 1_000_000
+"""The same of pairs of nodes."""
+
+LEAST_SOURCES = 64
+"""But at no fewer parcels or nodes than these."""
+
+LEAST_IN_PART = 16
+"""And at no fewer in each part of the land."""
+
+BLOCK = 250_000
+"""Pairs that are worked out at a time, so that memory does not grow with their number."""
 
 NEAR = 1.0
 """Places that are nearer in a straight line, in metres, have no detour."""
@@ -31,44 +38,43 @@ NEAR = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Routes:
-    """Ways along all streets, the rim's too; a parcel begins wherever its frontage is."""
+    """Ways along all streets, the rim's too.
+
+    A parcel meets the streets wherever its frontage is: each piece of it counts by its length,
+    from its middle.
+    """
 
     fabric: Fabric
 
     @cached_property
-    def _links(self) -> csr_array:
-        """(N, N) length of the shortest edge between two nodes."""
+    def _links(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """Nodes that network edges lead from and to, both ways, and the edges' lengths."""
         net = self.fabric.network
-        low, high = np.minimum(net.start, net.end), np.maximum(net.start, net.end)
-        order = np.lexsort((net.edge_length, high, low))
-        order = order[low[order] != high[order]]
-        pair = low[order] * np.int64(net.n_nodes) + high[order]
-        first = order[np.flatnonzero(np.diff(pair, prepend=-1))]
-        at = np.concatenate([low[first], high[first]]), np.concatenate([high[first], low[first]])
-        return csr_array((np.tile(net.edge_length[first], 2), at), shape=(net.n_nodes, net.n_nodes))
+        some = net.start != net.end
+        start, end, length = net.start[some], net.end[some], net.edge_length[some]
+        return np.append(start, end), np.append(end, start), np.tile(length, 2)
 
-    def _ways(self, nodes: IntArray) -> FloatArray:
-        """(n, N) ways from some nodes to all."""
-        return np.asarray(dijkstra(self._links, directed=False, indices=nodes))
+    @cached_property
+    def _graph(self) -> csr_array:
+        """(N, N) length of the shortest edge from node to node."""
+        return _shortest(*self._links, self.fabric.network.n_nodes)
 
     @cached_property
     def _to_rim(self) -> FloatArray:
         """(N,) ways to the rim; infinite where it cannot be reached."""
         net = self.fabric.network
-        gates = net.node_kind == NodeKind.ENTRY
-        gates[net.start[net.edge_rim]] = True
-        gates[net.end[net.edge_rim]] = True
-        if not gates.any():
+        gate = net.node_kind == NodeKind.ENTRY
+        gate[net.start[net.edge_rim]] = True
+        gate[net.end[net.edge_rim]] = True
+        if not gate.any():
             return np.full(net.n_nodes, np.inf)
-        return np.asarray(
-            dijkstra(self._links, directed=False, indices=np.flatnonzero(gates), min_only=True)
-        )
+        return np.asarray(dijkstra(self._graph, indices=np.flatnonzero(gate), min_only=True))
 
     @cached_property
     def _weight(self) -> FloatArray:
         """(A,) share that each piece has of its parcel's frontage."""
         fronts = self._fronts
-        total = np.bincount(fronts.parcel, weights=fronts.length, minlength=self._n_parcels)
+        total = np.bincount(fronts.parcel, weights=fronts.length)
         return np.asarray(fronts.length / total[fronts.parcel])
 
     @property
@@ -79,139 +85,228 @@ class Routes:
             return Fronts(nobody, nobody, np.empty(0), np.empty(0))
         return parcels.fronts
 
-    @property
-    def _n_parcels(self) -> int:
-        return 0 if self.fabric.parcels is None else len(self.fabric.parcels)
+    @cached_property
+    def _front_xy(self) -> FloatArray:
+        """(A, 2) places on the network opposite each piece."""
+        fronts = self._fronts
+        lines = self.fabric.street_lines[fronts.edge]
+        return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(lines, fronts.at)))
 
-    def parcel_values(self, chosen: BoolArray) -> dict[str, float]:
-        """Mean ways from some of the parcels to the rim and to each other.
+    def parcel_values(self, part: int | None, *, interior: bool) -> dict[str, float]:
+        """Mean ways from parcels to the rim and to each other.
 
         Parameters
         ----------
-        chosen
-            (F,) which parcels.
+        part
+            The piece of the land that they lie in; None for all.
+        interior
+            Whether interior parcels alone are meant.
         """
-        between = self._between_parcels
-        rows, columns = chosen[between.source], chosen[self._fronts.parcel]
+        parcels, sums = self.fabric.parcels, self._between_parcels
+        if parcels is None:
+            return {}
+        chosen = in_part(parcels.part, part) & ~(interior & parcels.rings.rim)
         return {
             "rim_distance_m": self._mean_to_rim(chosen),
-            "parcel_distance_m": between.mean(between.way, rows, columns),
-            "parcel_detour": between.mean(between.detour, rows, columns),
+            "parcel_distance_m": sums.mean_way(part, interior=interior),
+            "parcel_detour": sums.mean_detour(part, interior=interior),
         }
 
     def _mean_to_rim(self, chosen: BoolArray) -> float:
         net, fronts = self.fabric.network, self._fronts
-        rest = net.edge_length[fronts.edge] - fronts.at
         way = np.minimum(
-            fronts.at + self._to_rim[net.start[fronts.edge]],
-            rest + self._to_rim[net.end[fronts.edge]],
+            self._to_rim[net.start[fronts.edge]] + fronts.at,
+            self._to_rim[net.end[fronts.edge]] + net.edge_length[fronts.edge] - fronts.at,
         )
         way = np.where(net.edge_rim[fronts.edge], 0.0, way)
-        return _weighted(way, self._weight * (chosen[fronts.parcel] & np.isfinite(way)))
+        counted = chosen[fronts.parcel] & np.isfinite(way)
+        return _ratio((way * self._weight)[counted].sum(), self._weight[counted].sum())
 
     @cached_property
-    def _between_parcels(self) -> _Between:
-        """Ways from pieces of frontage of some parcels to all pieces."""
-        net, fronts = self.fabric.network, self._fronts
-        source = self._sources
-        edge, at = fronts.edge[source], fronts.at[source]
-        ends = np.column_stack([net.start[edge], net.end[edge]])
-        offset = np.column_stack([at, net.edge_length[edge] - at])
-        nodes, local = np.unique(ends, return_inverse=True)
-        ways = self._ways(nodes) if len(nodes) else np.empty((0, net.n_nodes))
-        local = local.reshape(-1, 2)
-        to_node = np.minimum(ways[local[:, 0]] + offset[:, :1], ways[local[:, 1]] + offset[:, 1:])
-        way = np.minimum(
-            to_node[:, net.start[fronts.edge]] + fronts.at,
-            to_node[:, net.end[fronts.edge]] + net.edge_length[fronts.edge] - fronts.at,
-        )
-        direct = np.abs(at[:, None] - fronts.at)
-        way = np.where(edge[:, None] == fronts.edge, np.minimum(way, direct), way)
-        z = self._front_places
-        parcel = fronts.parcel
-        weight = self._weight[source][:, None] * self._weight
-        weight = np.where(parcel[source][:, None] == parcel, 0.0, weight)
-        return _Between(way, np.abs(z[source][:, None] - z), weight, parcel[source])
-
-    @property
-    def _front_places(self) -> npt.NDArray[np.complex128]:
-        """(A,) places on the network opposite each piece."""
-        import shapely
-
-        fronts = self._fronts
-        lines = self.fabric.street_lines[fronts.edge]
-        xy = shapely.get_coordinates(shapely.line_interpolate_point(lines, fronts.at))
-        return np.asarray(xy[:, 0] + 1j * xy[:, 1])
-
-    @cached_property
-    def _sources(self) -> IntArray:
-        """Pieces of frontage that ways begin at: those of parcels spread over the land."""
+    def _between_parcels(self) -> _Sums:
+        """Ways from pieces of frontage of some parcels to all pieces of other parcels."""
         parcels, fronts = self.fabric.parcels, self._fronts
         if parcels is None or not len(fronts.parcel):
-            return np.empty(0, dtype=np.int64)
+            return _Sums.over(np.empty(0, dtype=np.int64), np.empty(0, dtype=bool))
+        factor = self._sources
+        piece = np.flatnonzero(factor[fronts.parcel] > 0)
+        sums = _Sums.over(parcels.part[fronts.parcel], parcels.rings.rim[fronts.parcel])
+        step = max(1, BLOCK // len(fronts.parcel))
+        for some in np.split(piece, range(step, len(piece), step)):
+            own = fronts.parcel[some][:, None] == fronts.parcel
+            sums.add(
+                some,
+                np.where(own, np.inf, self._ways_to_fronts(some)),
+                _straight(self._front_xy[some], self._front_xy),
+                (self._weight[some] * factor[fronts.parcel[some]], self._weight),
+            )
+        return sums
+
+    def _ways_to_fronts(self, some: IntArray) -> FloatArray:
+        """(s, A) ways from some pieces of frontage to all."""
+        net, fronts = self.fabric.network, self._fronts
+        edge, at, rest = fronts.edge, fronts.at, net.edge_length[fronts.edge] - fronts.at
+        source = net.n_nodes + np.arange(len(some))
+        tails, heads, length = self._links
+        graph = _shortest(
+            np.concatenate([tails, source, source]),
+            np.concatenate([heads, net.start[edge[some]], net.end[edge[some]]]),
+            np.concatenate([length, at[some], rest[some]]),
+            net.n_nodes + len(some),
+        )
+        to_node = np.asarray(dijkstra(graph, indices=source))
+        way = np.minimum(to_node[:, net.start[edge]] + at, to_node[:, net.end[edge]] + rest)
+        row, column = np.nonzero(edge[some][:, None] == edge)
+        direct = np.abs(at[some[row]] - at[column])
+        way[row, column] = np.minimum(way[row, column], direct)
+        return way
+
+    @cached_property
+    def _sources(self) -> FloatArray:
+        """(F,) number of parcels that each one stands for as a beginning of ways; 0 for none."""
+        parcels, fronts = self.fabric.parcels, self._fronts
+        if parcels is None:
+            return np.empty(0)
         present = np.unique(fronts.parcel)
         pieces = len(fronts.parcel)
         most = int(MOST_PAIRS / pieces / (pieces / len(present)))
-        z = self._front_places[np.searchsorted(fronts.parcel, present)]
-        chosen = _spread(z, parcels.part[present], max(LEAST_SOURCES, min(most, MOST_SOURCES)))
-        return np.flatnonzero(np.isin(fronts.parcel, present[chosen]))
+        xy = shapely.get_coordinates(shapely.centroid(parcels.rings.polygons[present]))
+        out = np.zeros(len(parcels))
+        out[present] = _spread(xy, parcels.part[present], most)
+        return out
 
     def network_values(self, part: int | None) -> dict[str, float]:
         """Mean detour between intersections, dead ends and places on the rim."""
-        between, sources, nodes = self._between_nodes
-        node_part = self.fabric.network.node_part
-        rows, columns = in_part(node_part[sources], part), in_part(node_part[nodes], part)
-        return {"network_detour": between.mean(between.detour, rows, columns)}
+        return {"network_detour": self._between_nodes.mean_detour(part, interior=False)}
 
     @cached_property
-    def _between_nodes(self) -> tuple[_Between, IntArray, IntArray]:
+    def _between_nodes(self) -> _Sums:
+        """Ways from some nodes that are no bends to all of them."""
         net = self.fabric.network
         nodes = np.flatnonzero((net.node_degree != 2) | (net.node_kind == NodeKind.ENTRY))
-        xy = self.fabric.lines.xy[net.node_vertex]
-        z = xy[:, 0] + 1j * xy[:, 1]
-        most = max(LEAST_SOURCES, min(MOST_SOURCES, MOST_PAIRS // max(len(nodes), 1)))
-        sources = nodes[_spread(z[nodes], net.node_part[nodes], most)]
-        way = self._ways(sources)[:, nodes] if len(sources) else np.empty((0, len(nodes)))
-        weight = np.where(sources[:, None] == nodes, 0.0, 1.0)
-        return (
-            _Between(way, np.abs(z[sources][:, None] - z[nodes]), weight, sources),
-            sources,
-            nodes,
-        )
+        sums = _Sums.over(net.node_part[nodes], np.zeros(len(nodes), dtype=bool))
+        if not len(nodes):
+            return sums
+        xy = self.fabric.lines.xy[net.node_vertex[nodes]]
+        factor = _spread(xy, net.node_part[nodes], MOST_NODE_PAIRS // len(nodes))
+        source = np.flatnonzero(factor)
+        step = max(1, BLOCK // net.n_nodes)
+        for some in np.split(source, range(step, len(source), step)):
+            way = np.asarray(dijkstra(self._graph, indices=nodes[some]))[:, nodes]
+            way[np.arange(len(some)), some] = np.inf
+            sums.add(some, way, _straight(xy[some], xy), (factor[some], np.ones(len(nodes))))
+        return sums
 
 
 @dataclass(frozen=True, eq=False)
-class _Between:
-    """Ways from S sources to T targets, the straight lines, and how much each pair counts."""
+class _Sums:
+    """Weighted sums over pairs of things, kept apart by part of the land and by rim or interior.
 
+    Parameters
+    ----------
+    part, rim
+        (G,) part of the land of each group of things, and whether it is that of the rim.
+    group
+        (T,) group of each thing.
+    way, pairs, detour, far
+        (G, G) sums from group to group of ways and of the weights of those; of detours and
+        of the weights of those.
+    """
+
+    part: IntArray
+    rim: BoolArray
+    group: IntArray
     way: FloatArray
-    straight: FloatArray
-    weight: FloatArray
-    source: IntArray
+    pairs: FloatArray
+    detour: FloatArray
+    far: FloatArray
 
-    @cached_property
-    def detour(self) -> FloatArray:
-        far = self.straight >= NEAR
-        return np.where(far, self.way / np.where(far, self.straight, 1.0), np.inf)
+    @classmethod
+    def over(cls, part: IntArray, rim: BoolArray) -> _Sums:
+        """Nothing yet, over things in parts of the land, on its rim or not."""
+        key, group = np.unique(2 * part + rim, return_inverse=True)
+        sums = np.zeros((4, len(key), len(key)))
+        return cls(key // 2, key % 2 == 1, group.ravel(), *sums)
 
-    def mean(self, values: FloatArray, rows: BoolArray, columns: BoolArray) -> float:
-        """Weighted mean over pairs that have a finite value."""
-        some = values[rows][:, columns]
-        known = np.isfinite(some)
-        return _weighted(np.where(known, some, 0.0), self.weight[rows][:, columns] * known)
+    def add(
+        self,
+        some: IntArray,
+        way: FloatArray,
+        straight: FloatArray,
+        weight: tuple[FloatArray, FloatArray],
+    ) -> None:
+        """Add ways (s, T), infinite ones left out, from some things to all of them."""
+        one, other = weight
+        onto = np.zeros((len(other), len(self.part)))
+        onto[np.arange(len(other)), self.group] = other
+        known = np.isfinite(way)
+        far = known & (straight >= NEAR)
+        way = np.where(known, way, 0.0)
+        detour = way / np.where(far, straight, 1.0)
+        for total, values in (
+            (self.way, way),
+            (self.pairs, known),
+            (self.detour, np.where(far, detour, 0.0)),
+            (self.far, far),
+        ):
+            np.add.at(total, self.group[some], one[:, None] * (values @ onto))
+
+    def mean_way(self, part: int | None, *, interior: bool) -> float:
+        """Mean way between things of a part, or of interior ones."""
+        return self._mean(self.way, self.pairs, part, interior=interior)
+
+    def mean_detour(self, part: int | None, *, interior: bool) -> float:
+        """Mean over pairs of the way over the straight line."""
+        return self._mean(self.detour, self.far, part, interior=interior)
+
+    def _mean(
+        self, total: FloatArray, weight: FloatArray, part: int | None, *, interior: bool
+    ) -> float:
+        here = in_part(self.part, part) & ~(interior & self.rim)
+        chosen = np.ix_(here, here)
+        return _ratio(total[chosen].sum(), weight[chosen].sum())
 
 
-def _weighted(values: FloatArray, weight: FloatArray) -> float:
-    total = float(weight.sum())
-    return float((np.where(weight > 0, values, 0.0) * weight).sum()) / total if total else math.nan
+def _ratio(total: float, weight: float) -> float:
+    return float(total) / float(weight) if weight > 0 else math.nan
 
 
-def _spread(z: npt.NDArray[np.complex128], part: IntArray, most: int) -> IntArray:
-    """Rows spread evenly over places in order of their coordinates, some in each part."""
-    order = np.lexsort((np.round(z.imag, 3), np.round(z.real, 3), part))
-    chosen = []
-    for rows in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
-        share = max(LEAST_SOURCES, round(most * len(rows) / max(len(z), 1)))
+def _straight(some: FloatArray, xy: FloatArray) -> FloatArray:
+    """(s, T) distances in a straight line."""
+    dx, dy = some[:, :1] - xy[:, 0], some[:, 1:] - xy[:, 1]
+    return np.asarray(np.sqrt(dx * dx + dy * dy))
+
+
+def _shortest(tails: IntArray, heads: IntArray, length: FloatArray, n: int) -> csr_array:
+    """(n, n) length of the shortest of the links from each node to each other."""
+    order = np.lexsort((length, heads, tails))
+    new = np.diff(tails[order], prepend=-1) != 0
+    new |= np.diff(heads[order], prepend=-1) != 0
+    first = order[new]
+    return csr_array((length[first], (tails[first], heads[first])), shape=(n, n))
+
+
+def _spread(xy: FloatArray, part: IntArray, most: int) -> FloatArray:
+    """(n,) how many places each one stands for, if some are chosen, spread evenly; else 0.
+
+    All are chosen if they are no more than `most`, or than `LEAST_SOURCES`. Each part of the land
+    has its share, and at least `LEAST_IN_PART`.
+    """
+    out = np.zeros(len(xy))
+    most = max(most, LEAST_SOURCES)
+    for p in np.unique(part):
+        rows = np.flatnonzero(part == p)
+        share = max(LEAST_IN_PART, math.ceil(most * len(rows) / len(xy)))
         n = min(len(rows), share)
-        chosen.append(rows[np.floor(np.arange(n) * (len(rows) / n) if n else []).astype(int)])
-    return np.sort(np.concatenate(chosen))
+        order = rows[_snake(np.round(xy[rows], 3), strips=round(math.sqrt(n)))]
+        chosen = order[np.floor((np.arange(n) + 0.5) * (len(rows) / n)).astype(np.int64)]
+        out[chosen] = len(rows) / n
+    return out
+
+
+def _snake(xy: FloatArray, *, strips: int) -> IntArray:
+    """Order of places up and down strips of equally many, so that followers are neighbours."""
+    x, y = xy[:, 0], xy[:, 1]
+    strip = np.empty(len(xy), dtype=np.int64)
+    strip[np.lexsort((y, x))] = np.arange(len(xy)) * strips // len(xy)
+    return np.lexsort((x, np.where(strip % 2, -y, y), strip))

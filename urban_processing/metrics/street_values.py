@@ -8,11 +8,13 @@ import numpy as np
 import shapely
 
 from urban_processing.fabric.model import Fabric
+from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.metrics.averages import highest, in_part, mean
 from urban_processing.metrics.registry import INTERIOR
 from urban_processing.metrics.segments import Segments
 from urban_processing.streets.classes import NodeKind
+from urban_processing.streets.network_model import StreetNetwork
 
 BINS = 36
 """Bins of the compass for the entropy of bearings (Boeing 2019)."""
@@ -32,7 +34,7 @@ def street_values(fabric: Fabric, segments: Segments, part: int | None) -> dict[
 
 
 def _chen(fabric: Fabric, part: int | None) -> dict[str, float]:
-    """Figures of Chen 2024, Table 1."""
+    """Figures of Chen 2024, Table 1, and the connected pieces."""
     net = fabric.network
     street = ~net.street_rim & in_part(net.street_part, part)
     node = net.node_interior & in_part(net.node_part, part)
@@ -52,7 +54,14 @@ def _chen(fabric: Fabric, part: int | None) -> dict[str, float]:
         "junction_deviation_deg": mean(deviation),
         "junction_deviation_deg" + INTERIOR: mean(net.pair_deviation[here & (net.pair_rim == 0)]),
         "junction_deviation_max_deg": highest(deviation),
+        "network_pieces": _pieces(net, part),
     }
+
+
+def _pieces(net: StreetNetwork, part: int | None) -> int:
+    """Connected pieces of the network, the rim included."""
+    piece = components(net.n_nodes, np.column_stack([net.start, net.end]))
+    return len(np.unique(piece[in_part(net.node_part, part)]))
 
 
 def _shares(fabric: Fabric, part: int | None) -> dict[str, float]:

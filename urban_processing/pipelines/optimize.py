@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import time
 
 import numpy as np
@@ -47,7 +46,7 @@ def optimize(layout: Layout, params: OptimizeParams, progress: Progress = SILENT
         parameters=params.as_dict(),
         seed=0,
         version=__version__,
-        input_sha256=_digest(layout),
+        input_sha256=layout.digest,
         seconds=time.perf_counter() - started,
         results=optimized.results(),
     )
@@ -84,10 +83,3 @@ def _moved(layout: Layout) -> tuple[Issue, ...]:
         if issue.code not in (SWALLOWED, CUT_OFF)
     )
     return (*kept, *right_of_way_findings(layout))
-
-
-def _digest(layout: Layout) -> str:
-    """Hash of the parcels and streets of a layout."""
-    mesh = layout.mesh
-    arrays = (mesh.xy, mesh.origin, mesh.next, mesh.face, layout.edge_street)
-    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()

@@ -71,9 +71,13 @@ class _Source:
         return (
             a.mesh is b.mesh
             and a.street_rules == b.street_rules
+            and a.fixed_streets == b.fixed_streets
             and all(
                 np.array_equal(getattr(a, name), getattr(b, name))
-                for name in ("edge_street", "edge_level", "edge_kind", "face_part")
+                for name in (
+                    *("edge_street", "edge_level", "edge_kind", "edge_fixed"),
+                    *("vertex_entry", "face_part"),
+                )
             )
         )
 

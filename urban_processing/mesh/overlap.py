@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +27,24 @@ class Segments:
 
 @dataclass(frozen=True, eq=False)
 class Overlaps:
-    """Pairs of segments that run along one another, from share `low` to `high` of the first."""
+    """Pairs of segments that run along one another, from share `low` to `high` of the first.
+
+    `aside` and `far` are how far the second lies to the left of the first halfway between these,
+    and the largest distance to either side, in metres across the first; `angle` is that between
+    them in degrees, 0 to 90.
+    """
 
     first: IntArray
     second: IntArray
     low: FloatArray
     high: FloatArray
+    aside: FloatArray
+    far: FloatArray
+    angle: FloatArray
+
+    def take(self, rows: IntArray | BoolArray) -> Overlaps:
+        """Return some of the pairs."""
+        return Overlaps(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
 def segments_of(geometries: npt.NDArray[np.object_]) -> Segments:
@@ -64,10 +76,35 @@ def unmatched_segments(polygons: npt.NDArray[np.object_]) -> Segments:
     return Segments(segments.start[left], segments.end[left], segments.line[left])
 
 
-def find_overlaps(first: Segments, second: Segments, tolerance: float) -> Overlaps:
-    """All pairs that lie within `tolerance` metres of one another along a length."""
-    tree = shapely.STRtree(_lines(second))
-    i, j = tree.query(_lines(first), predicate="dwithin", distance=tolerance)
+def find_overlaps(
+    first: Segments,
+    second: Segments,
+    tolerance: float | FloatArray,
+    *,
+    clipped: bool = False,
+    least: float | None = None,
+) -> Overlaps:
+    """All pairs that lie within a tolerance of one another along a length, sorted.
+
+    Parameters
+    ----------
+    first, second
+        Segments.
+    tolerance
+        Metres across the first segment, one for all or one for each second segment.
+    clipped
+        Whether of two segments that are further apart at one end the rest is taken; else they
+        are no pair.
+    least
+        Metres that they run along one another at least; by default the tolerance.
+    """
+    within = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), len(second.line))
+    j, i = shapely.STRtree(_lines(first)).query(
+        _lines(second), predicate="dwithin", distance=within
+    )
+    order = np.lexsort((j, i))
+    i, j = i[order], j[order]
+    limit = within[j]
     d = first.end[i] - first.start[i]
     length = np.hypot(d[:, 0], d[:, 1])
     d = d / length[:, None]
@@ -77,11 +114,36 @@ def find_overlaps(first: Segments, second: Segments, tolerance: float) -> Overla
     high = np.clip(np.maximum(along_a, along_b), 0.0, length)
     run = along_b - along_a
     slope = (off_b - off_a) / np.where(run == 0.0, 1.0, run)
-    far = np.maximum(
-        np.abs(off_a + slope * (low - along_a)), np.abs(off_a + slope * (high - along_a))
+    if clipped:
+        low, high = _clipped(low, high, off_a - slope * along_a, slope, limit)
+    ends = [off_a + slope * (at - along_a) for at in (low, high)]
+    far = np.maximum(np.abs(ends[0]), np.abs(ends[1]))
+    on = high - low > (limit if least is None else least)
+    if not clipped:
+        on &= far <= limit
+    found = Overlaps(
+        i,
+        j,
+        low / length,
+        high / length,
+        (ends[0] + ends[1]) / 2,
+        far,
+        np.degrees(np.arctan2(np.abs(off_b - off_a), np.abs(run))),
     )
-    on = (high - low > tolerance) & (far <= tolerance)
-    return Overlaps(i[on], j[on], low[on] / length[on], high[on] / length[on])
+    return found.take(on)
+
+
+def _clipped(
+    low: FloatArray, high: FloatArray, at_start: FloatArray, slope: FloatArray, limit: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What is left of stretches where ``at_start + slope * along`` is within a limit."""
+    level = slope == 0.0
+    divisor = np.where(level, 1.0, slope)
+    bounds = (-limit - at_start) / divisor, (limit - at_start) / divisor
+    inside = np.abs(at_start) <= limit
+    begin = np.where(level, np.where(inside, low, high), np.minimum(*bounds))
+    end = np.where(level, high, np.maximum(*bounds))
+    return np.maximum(low, begin), np.minimum(high, end)
 
 
 def covered_share(overlaps: Overlaps, n: int) -> FloatArray:

@@ -1,0 +1,134 @@
+"""Measuring and comparing in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any
+
+from urban_processing.fabric.model import Fabric
+from urban_processing.io.comparison import read_compared
+from urban_processing.io.fabrics import read_fabric
+from urban_processing.io.features import Source
+from urban_processing.io.frames import GeoLayers, GeoLayout
+from urban_processing.io.measured import GeoComparison, GeoFabric
+from urban_processing.params.compare import CompareParams
+from urban_processing.params.measure import MeasureParams
+from urban_processing.pipelines import measure as pipeline
+from urban_processing.progress import SILENT, Progress
+
+Measurable = GeoLayout | GeoLayers | GeoFabric | Fabric | str | PathLike[str]
+"""What can be measured as it is; parcels and streets of other origin are given as layers."""
+
+
+def measure(
+    layout: Measurable | None = None,
+    *,
+    parcels: Source | None = None,
+    streets: Source | None = None,
+    land: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoFabric:
+    """Measure a layout, or any parcels and streets.
+
+    Parameters
+    ----------
+    layout
+        What `cogenerate`, `optimize` or `subdivide` made, its file, or another file with one
+        layer of parcels and one of streets.
+    parcels, streets
+        Instead: polygons and lines, as files, GeoDataFrames or geometries; one may be left out.
+    land
+        Polygons that they are cut at; by default what they cover.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `MeasureParams`.
+
+    Returns
+    -------
+    GeoFabric
+        Parcels, streets and blocks with their measures as frames, metrics, and the report.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> left, right = shapely.box(0, 0, 30, 40), shapely.box(30, 0, 60, 40)
+    >>> street = shapely.LineString([(0, 0), (60, 0)])
+    >>> found = measure(parcels=[left, right], streets=[street])
+    >>> found.metric("parcels"), found.metric("quads_pct")
+    (2.0, 100.0)
+    """
+    params = MeasureParams.from_values(parameters)
+    fabric = read_fabric(layout, parcels=parcels, streets=streets, land=land, params=params)
+    return GeoFabric(pipeline.measure(fabric, params, progress))
+
+
+def compare(
+    *layouts: Measurable,
+    names: Sequence[str] = (),
+    parcels: Source | None = None,
+    streets: Source | None = None,
+    osm_file: str | PathLike[str] | None = None,
+    osm: bool = False,
+    land: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoComparison:
+    """Set layouts, and what is there in the same land, side by side.
+
+    Parameters
+    ----------
+    *layouts
+        As in `measure`.
+    names
+        What the sides are called; by default as their files are.
+    parcels, streets
+        Parcels and streets that are there: one more side.
+    osm_file
+        An extract of OpenStreetMap with the streets that are there.
+    osm
+        Whether these are fetched from OpenStreetMap's server; they are kept for the next time.
+    land
+        Polygons that what is there is cut at; by default the land of the first layout.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `CompareParams`.
+
+    Returns
+    -------
+    GeoComparison
+        The sides, the table of metrics, the distances of distributions, and the report.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    Examples
+    --------
+    >>> import urban_processing as up
+    >>> layout = up.cogenerate("sample_data/mauren.gpkg", parcels=300)  # doctest: +SKIP
+    >>> found = up.compare(layout, osm_file="mauren.osm.bz2")  # doctest: +SKIP
+    >>> found.comparison[["metric", "difference"]]  # doctest: +SKIP
+    """
+    params = CompareParams.from_values(parameters)
+    named = [(names[k] if k < len(names) else "", layout) for k, layout in enumerate(layouts)]
+    compared = read_compared(
+        named,
+        parcels=parcels,
+        streets=streets,
+        land=land,
+        osm_file=osm_file,
+        osm=osm,
+        params=params,
+        progress=progress.slice(0.0, 0.3),
+    )
+    return GeoComparison(pipeline.compare_fabrics(compared, params, progress.slice(0.3, 1.0)))

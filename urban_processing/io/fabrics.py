@@ -1,0 +1,212 @@
+"""Fabrics out of files, frames and what the algorithms made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import pyogrio
+import pyproj
+import shapely
+from pyogrio.errors import DataSourceError
+
+from urban_processing.errors import BoundaryError
+from urban_processing.fabric.model import Fabric
+from urban_processing.intake.fabrics import PARCEL_COLUMNS, build_fabric
+from urban_processing.intake.features import Features
+from urban_processing.intake.street_lines import STREET_COLUMNS
+from urban_processing.io.crs import PYPROJ, asked_crs
+from urban_processing.io.features import PARQUET, Source, may_hold, read_features, split_layer_name
+from urban_processing.io.files import read_layout
+from urban_processing.io.frames import GeoLayers
+from urban_processing.io.layouts import layer_in
+from urban_processing.layout import Layout
+from urban_processing.layout_file.geopackage import LAYERS_STATE, LAYOUT_STATE, read_state
+from urban_processing.metrics import MeasuredLayout
+from urban_processing.metrics.measures import LayoutMeasures
+from urban_processing.params.measure import MeasureParams
+from urban_processing.schema import BOUNDARY, PARCELS, STREETS
+
+_BLOCKS = "blocks"
+"""Kind of a file that `blocks` wrote."""
+
+
+def read_fabric(
+    source: Source | MeasuredLayout | Layout | GeoLayers | Fabric | None = None,
+    *,
+    parcels: Source | None = None,
+    streets: Source | None = None,
+    land: Source | None = None,
+    crs: object = None,
+    params: MeasureParams | None = None,
+) -> Fabric:
+    """Read what is to be measured: a layout, or layers of parcels and streets of any program.
+
+    Parameters
+    ----------
+    source
+        A layout or its file; a file with a layer of parcels and one of streets (those of these
+        names, else the only ones with polygons and with lines); a frame of polygons or of lines;
+        what `subdivide` made, or its file, in which there are no streets.
+    parcels, streets, land
+        Polygons, lines and polygons instead of those of `source`, or besides: files, also
+        followed by a layer as in ``file.gpkg|layername=plots``, GeoDataFrames, GeoSeries or
+        shapely geometries.
+    crs
+        Projected CRS in metres to work in; the CRS of what has none.
+    params
+        Widths and tolerances.
+
+    Raises
+    ------
+    BoundaryError
+        With everything that is wrong.
+    """
+    given = {"parcels": parcels, "streets": streets, "land": land}
+    ready = _ready(source)
+    if ready is not None:
+        besides = [name for name, value in given.items() if value is not None]
+        if besides or crs is not None:
+            named = ", ".join([*besides, *(["crs"] if crs is not None else [])])
+            raise BoundaryError(f"A layout is ready as it is: leave out {named}.")
+        return ready
+    if source is not None:
+        given = {**_layers_of(source, given), **{k: v for k, v in given.items() if v is not None}}
+    problems: list[str] = []
+    asked = asked_crs(crs, problems)
+    read = {
+        name: _read(given.get(name), name, kind, layer, columns, problems)
+        for name, kind, layer, columns in (
+            ("parcels", "polygon", PARCELS.name, PARCEL_COLUMNS),
+            ("streets", "line", STREETS.name, STREET_COLUMNS),
+            ("land", "polygon", BOUNDARY.name, ()),
+        )
+    }
+    if problems:
+        raise BoundaryError(problems)
+    return build_fabric(
+        read["parcels"], read["streets"], read["land"], library=PYPROJ, asked=asked, params=params
+    )
+
+
+def _ready(source: Any) -> Fabric | None:
+    """The fabric that a source is already; None for layers."""
+    if isinstance(source, Fabric):
+        return source
+    if isinstance(source, MeasuredLayout):
+        return LayoutMeasures(source.layout).of_fabric.fabric
+    if isinstance(source, Layout):
+        return LayoutMeasures(source).of_fabric.fabric
+    if isinstance(source, str | PathLike) and _state(source, LAYOUT_STATE) is not None:
+        return LayoutMeasures(read_layout(fspath(source)).layout).of_fabric.fabric
+    return None
+
+
+def _state(source: str | PathLike[str], standard: str) -> str | None:
+    path = Path(fspath(source))
+    is_ours = path.suffix.lower() == ".gpkg" and path.is_file()
+    return read_state(path, standard) if is_ours else None
+
+
+def _layers_of(source: Any, given: dict[str, Source | None]) -> dict[str, Source | None]:
+    """Parcels, streets and land of a source as sources of their own."""
+    if isinstance(source, GeoLayers):
+        return _of_names(source.made.names, source.frame, repr(source), given)
+    if isinstance(source, str | PathLike):
+        path, layer = split_layer_name(source)
+        if layer is not None:
+            raise BoundaryError(
+                f"{fspath(source)} is one layer: give it as parcels or as streets (parcels=..., "
+                "streets=...)."
+            )
+        return _of_file(fspath(path), given)
+    features = read_features(source)
+    kinds = set(shapely.get_dimensions(features.geometry[features.present()]).tolist())
+    if kinds == {1}:
+        return {"streets": source}
+    return {"parcels": source}
+
+
+def _of_names(
+    names: Sequence[str], get: Any, called: str, given: dict[str, Source | None]
+) -> dict[str, Source | None]:
+    """Layers of ours by their names."""
+    wanted = {"parcels": PARCELS.name, "streets": STREETS.name, "land": BOUNDARY.name}
+    found = {name: get(layer) for name, layer in wanted.items() if layer in names}
+    if not (found.keys() & {"parcels", "streets"}) and _nothing(given):
+        raise BoundaryError(
+            f"There are neither parcels nor streets in {called}, but {', '.join(names)}: give the "
+            "streets that they were made of."
+        )
+    return found
+
+
+def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | None]:
+    text = _state(path, LAYERS_STATE)
+    if text is not None:
+        kind = json.loads(text)["kind"]
+        names = [str(name) for name, _ in pyogrio.list_layers(path)]
+        called = f"{path}, which holds {kind}"
+        return _of_names(names, lambda layer: f"{path}|layername={layer}", called, given)
+    if path.lower().endswith(PARQUET) or not Path(path).exists():
+        return _of_one_layer(path, given)
+    try:
+        layers = [(str(name), kind) for name, kind in pyogrio.list_layers(path)]
+    except DataSourceError:
+        return {"parcels": path}  # reading it says what is wrong
+    found: dict[str, Source | None] = {}
+    problems = []
+    for name, layer, geometry in (
+        ("parcels", PARCELS.name, "polygon"),
+        ("streets", STREETS.name, "line"),
+    ):
+        if given[name] is not None:
+            continue
+        fitting = [n for n, kind in layers if kind is not None and may_hold(kind, geometry)]
+        chosen = [layer] if layer in fitting else fitting
+        if len(chosen) > 1:
+            problems.append(
+                f"{path} has several layers of {geometry}s: {', '.join(chosen)}. Say which are the "
+                f"{name}, as in {name}={path}|layername=NAME."
+            )
+        elif chosen:
+            found[name] = f"{path}|layername={chosen[0]}"
+    if not problems and not found and _nothing(given):
+        problems.append(
+            f"{path} has neither polygons nor lines; its layers are "
+            f"{', '.join(name for name, _ in layers) or '(none)'}."
+        )
+    if problems:
+        raise BoundaryError(problems)
+    return found
+
+
+def _nothing(given: dict[str, Source | None]) -> bool:
+    return given["parcels"] is None and given["streets"] is None
+
+
+def _of_one_layer(path: str, given: dict[str, Source | None]) -> dict[str, Source | None]:
+    """A file of a single layer: the parcels, unless these are given."""
+    return {"streets": path} if given["parcels"] is not None else {"parcels": path}
+
+
+def _read(
+    source: Source | None,
+    name: str,
+    kind: str,
+    named: str,
+    columns: Sequence[str],
+    problems: list[str],
+) -> Features[pyproj.CRS] | None:
+    """Read a layer; None where there is none or that failed, and why is added to `problems`."""
+    if source is None:
+        return None
+    path, layer = split_layer_name(source)
+    try:
+        return read_features(path, layer=layer or layer_in(path, named), kind=kind, columns=columns)
+    except BoundaryError as error:
+        problems += [f"{name.capitalize()}: {problem}" for problem in error.problems]
+        return None

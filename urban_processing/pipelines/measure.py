@@ -1,0 +1,129 @@
+"""Measuring a fabric, and comparing several."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+
+from urban_processing.errors import ParameterError
+from urban_processing.fabric.model import ComparedFabrics, Fabric
+from urban_processing.metrics.comparison import Comparison, Side, compare, unique_names
+from urban_processing.metrics.measures import FabricMeasures
+from urban_processing.metrics.samples import samples
+from urban_processing.params.compare import CompareParams
+from urban_processing.params.measure import MeasureParams
+from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
+from urban_processing.version import __version__
+
+
+def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) -> FabricMeasures:
+    """Work out every metric of a fabric; its history tells that it was measured.
+
+    Parameters
+    ----------
+    fabric
+        What is measured.
+    params
+        Parameters that it was read with.
+    progress
+        Told how far the work is; may stop it.
+    """
+    started = time.perf_counter()
+    known = FabricMeasures(fabric)
+    progress.update(0.1, "Parcels")
+    _ = known.parcels, known.block_sides
+    progress.update(0.5, "Ways along streets")
+    _ = known.metrics
+    step = Step(
+        algorithm="measure",
+        parameters=params.as_dict(),
+        seed=0,
+        version=__version__,
+        input_sha256=fabric.input_sha256,
+        seconds=time.perf_counter() - started,
+    )
+    measured = FabricMeasures(replace(fabric, history=(*fabric.history, step)))
+    # what is worked out needs not be worked out again
+    measured.__dict__.update({k: v for k, v in known.__dict__.items() if k != "fabric"})
+    progress.update(1.0, "Measured")
+    return measured
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedMeasures:
+    """Fabrics that were measured and compared.
+
+    Parameters
+    ----------
+    measured
+        Their measures, those of what is there last, each under a name of its own.
+    comparison
+        The table of their metrics, and the distances of their distributions.
+    history
+        The step that made this.
+    """
+
+    measured: tuple[FabricMeasures, ...]
+    comparison: Comparison
+    history: tuple[Step, ...]
+
+
+def compare_fabrics(
+    compared: ComparedFabrics, params: CompareParams, progress: Progress = SILENT
+) -> ComparedMeasures:
+    """Measure fabrics and set them side by side.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than two, or the reference is none of them.
+    """
+    started = time.perf_counter()
+    fabrics = _named(compared.all)
+    if len(fabrics) < 2:
+        raise ParameterError(
+            "A comparison needs two sides: give two files, or one and what is there: "
+            "OpenStreetMap, or layers of parcels and streets."
+        )
+    names = [fabric.name for fabric in fabrics]
+    reference = params.reference
+    if reference is None:
+        reference = names[0] if compared.real is None else names[-1]
+    if reference not in names:
+        raise ParameterError(
+            f"There is no side called {reference!r} to compare with: there are {', '.join(names)}."
+        )
+    share = 0.8 / len(fabrics)
+    measured = [
+        measure(fabric, params, progress.slice(k * share, (k + 1) * share))
+        for k, fabric in enumerate(fabrics)
+    ]
+    progress.update(0.8, "Distributions")
+    sides = [Side(known.fabric.name, known.values, samples(known)) for known in measured]
+    comparison = compare(
+        sides,
+        reference=reference,
+        seed=params.seed,
+        resamples=params.resamples,
+        confidence=params.confidence,
+    )
+    progress.update(1.0, "Compared")
+    digest = sha256("".join(known.fabric.input_sha256 for known in measured).encode())
+    step = Step(
+        algorithm="compare",
+        parameters=params.as_dict(),
+        seed=params.seed,
+        version=__version__,
+        input_sha256=digest.hexdigest(),
+        seconds=time.perf_counter() - started,
+    )
+    return ComparedMeasures(tuple(measured), comparison, (step,))
+
+
+def _named(fabrics: Sequence[Fabric]) -> list[Fabric]:
+    """The fabrics under names that differ."""
+    names = unique_names([fabric.name or "layout" for fabric in fabrics])
+    return [replace(fabric, name=name) for fabric, name in zip(fabrics, names, strict=True)]

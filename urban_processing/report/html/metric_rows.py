@@ -1,0 +1,128 @@
+"""The table of metrics: rows in groups, a column for each side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from urban_processing.metrics.comparison import MetricRow
+from urban_processing.metrics.registry import MetricSpec
+from urban_processing.report.html.digits import decimals_for, number, signed
+from urban_processing.report.html.labels import GROUPS, group, is_interior, label
+from urban_processing.report.html.model import Report
+
+PART_METRICS = (
+    "area_m2",
+    "parcels",
+    "area_mean_m2",
+    "irregularity_mean",
+    "unreached",
+    "blocks",
+    "street_length_m",
+    "intersections",
+    "dead_ends",
+)
+"""Metrics that the table of the parts of a land shows."""
+
+MOST_PARTS = 50
+"""Parts that it shows at most."""
+
+
+@dataclass(frozen=True)
+class MetricLine:
+    """One metric as a row: values and differences as text, and the side that is better."""
+
+    term: str
+    label: str
+    unit: str
+    values: tuple[str, ...]
+    differences: tuple[str, ...]
+    better: int | None
+
+
+@dataclass(frozen=True)
+class MetricGroup:
+    """Rows under a heading."""
+
+    title: str
+    lines: tuple[MetricLine, ...]
+
+
+@dataclass(frozen=True)
+class PartTable:
+    """Some metrics of each part of the land of one side, and how many parts are left out."""
+
+    side: str
+    heads: tuple[tuple[str, str, str], ...]
+    rows: tuple[tuple[int, tuple[str, ...]], ...]
+    more: int
+
+
+def metric_rows(report: Report) -> tuple[MetricRow, ...]:
+    """Return every metric that a side has a value of; a single side is not compared."""
+    if report.comparison is not None:
+        return report.comparison.rows
+    values = report.sides[0].values
+    return tuple(
+        MetricRow(name, spec.unit, spec, (float(values[name]),), (0.0,), None)
+        for name, spec in report.metric_specs().items()
+        if math.isfinite(values.get(name, math.nan))
+    )
+
+
+def metric_groups(report: Report) -> list[MetricGroup]:
+    """Return the rows by group; last those of interior parcels alone."""
+    rows = metric_rows(report)
+    whole = [r for r in rows if not is_interior(r.name, r.spec)]
+    inner = [r for r in rows if is_interior(r.name, r.spec)]
+    found = [(title, [r for r in whole if group(r.name) == title]) for title in GROUPS]
+    found.append(("Interior parcels alone", inner))
+    return [
+        MetricGroup(t, tuple(_lines(chosen, report.reference))) for t, chosen in found if chosen
+    ]
+
+
+def _lines(rows: Iterable[MetricRow], reference: int | None) -> Iterable[MetricLine]:
+    for row in rows:
+        decimals = decimals_for(row.values)
+        yield MetricLine(
+            row.spec.name,
+            label(row.name),
+            row.unit,
+            tuple(number(v, decimals) for v in row.values),
+            tuple(
+                signed(d, decimals)
+                for k, d in enumerate(row.differences)
+                if reference is not None and k != reference
+            ),
+            row.better,
+        )
+
+
+def part_tables(report: Report) -> list[PartTable]:
+    """Return the metrics of the parts of each land that has several."""
+    specs = report.metric_specs()
+    return [
+        _part_table(name, parts, specs)
+        for name, side in zip(report.names, report.sides, strict=True)
+        if (parts := side.parts())
+    ]
+
+
+def _part_table(
+    side: str, parts: dict[int, dict[str, float]], specs: dict[str, MetricSpec]
+) -> PartTable:
+    known = [
+        m
+        for m in PART_METRICS
+        if any(math.isfinite(values.get(m, math.nan)) for values in parts.values())
+    ]
+    columns = []
+    for metric in known:
+        values = [part.get(metric, math.nan) for part in parts.values()]
+        decimals = decimals_for(values)
+        columns.append([number(v, decimals) for v in values])
+    rows = list(zip(parts, zip(*columns, strict=True), strict=True)) if columns else []
+    heads = tuple((m, label(m), specs[m].unit) for m in known)
+    return PartTable(side, heads, tuple(rows[:MOST_PARTS]), max(len(rows) - MOST_PARTS, 0))
