@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import pyogrio
 import pyproj
@@ -23,19 +24,21 @@ from urban_processing.io.features import PARQUET, Source, may_hold, read_feature
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers
 from urban_processing.io.layouts import layer_in
+from urban_processing.io.measured import GeoFabric
 from urban_processing.layout import Layout
+from urban_processing.layout_file.files import as_written
 from urban_processing.layout_file.geopackage import LAYERS_STATE, LAYOUT_STATE, read_state
 from urban_processing.metrics import MeasuredLayout
 from urban_processing.metrics.measures import LayoutMeasures
 from urban_processing.params.measure import MeasureParams
 from urban_processing.schema import BOUNDARY, PARCELS, STREETS
 
-_BLOCKS = "blocks"
-"""Kind of a file that `blocks` wrote."""
+Measurable: TypeAlias = Source | MeasuredLayout | Layout | GeoLayers | Fabric
+"""What can be measured as it is; see `read_fabric`."""
 
 
 def read_fabric(
-    source: Source | MeasuredLayout | Layout | GeoLayers | Fabric | None = None,
+    source: Measurable | None = None,
     *,
     parcels: Source | None = None,
     streets: Source | None = None,
@@ -50,7 +53,8 @@ def read_fabric(
     source
         A layout or its file; a file with a layer of parcels and one of streets (those of these
         names, else the only ones with polygons and with lines); a frame of polygons or of lines;
-        what `subdivide` made, or its file, in which there are no streets.
+        what `subdivide` made, or its file, in which there are no streets; what was measured
+        before.
     parcels, streets, land
         Polygons, lines and polygons instead of those of `source`, or besides: files, also
         followed by a layer as in ``file.gpkg|layername=plots``, GeoDataFrames, GeoSeries or
@@ -59,6 +63,11 @@ def read_fabric(
         Projected CRS in metres to work in; the CRS of what has none.
     params
         Widths and tolerances.
+
+    Returns
+    -------
+    Fabric
+        Called as its file is, without the ending; without a name if it comes from no file.
 
     Raises
     ------
@@ -73,6 +82,7 @@ def read_fabric(
             named = ", ".join([*besides, *(["crs"] if crs is not None else [])])
             raise BoundaryError(f"A layout is ready as it is: leave out {named}.")
         return ready
+    first = next((s for s in (source, parcels, streets) if s is not None), None)
     if source is not None:
         given = {**_layers_of(source, given), **{k: v for k, v in given.items() if v is not None}}
     problems: list[str] = []
@@ -87,22 +97,48 @@ def read_fabric(
     }
     if problems:
         raise BoundaryError(problems)
-    return build_fabric(
+    fabric = build_fabric(
         read["parcels"], read["streets"], read["land"], library=PYPROJ, asked=asked, params=params
     )
+    return replace(fabric, name=source_name(first))
+
+
+def source_name(source: Any) -> str:
+    """Return what a fabric is called that is read from a source; empty for a nameless one.
+
+    >>> source_name("towns/mauren.gpkg|layername=plots"), source_name([])
+    ('mauren', '')
+    """
+    if isinstance(source, GeoFabric):
+        return source.measures.fabric.name
+    if isinstance(source, Fabric):
+        return source.name
+    path, _ = split_layer_name(source)
+    return Path(fspath(path)).stem if isinstance(path, str | PathLike) else ""
+
+
+def is_ready(source: Any) -> bool:
+    """Return whether a source is a layout or a fabric, to which no layers can be added."""
+    if isinstance(source, str | PathLike):
+        return _state(source, LAYOUT_STATE) is not None
+    return isinstance(source, Fabric | GeoFabric | MeasuredLayout | Layout)
 
 
 def _ready(source: Any) -> Fabric | None:
     """The fabric that a source is already; None for layers."""
+    if not is_ready(source):
+        return None
     if isinstance(source, Fabric):
         return source
-    if isinstance(source, MeasuredLayout):
-        return LayoutMeasures(source.layout).of_fabric.fabric
+    if isinstance(source, GeoFabric):
+        return source.measures.fabric
     if isinstance(source, Layout):
-        return LayoutMeasures(source).of_fabric.fabric
-    if isinstance(source, str | PathLike) and _state(source, LAYOUT_STATE) is not None:
-        return LayoutMeasures(read_layout(fspath(source)).layout).of_fabric.fabric
-    return None
+        layout = as_written(source)  # what is measured is the same as in its file
+    elif isinstance(source, MeasuredLayout):
+        layout = as_written(source.layout)
+    else:
+        layout = read_layout(fspath(source)).layout
+    return replace(LayoutMeasures(layout).of_fabric.fabric, name=source_name(source))
 
 
 def _state(source: str | PathLike[str], standard: str) -> str | None:
@@ -119,8 +155,8 @@ def _layers_of(source: Any, given: dict[str, Source | None]) -> dict[str, Source
         path, layer = split_layer_name(source)
         if layer is not None:
             raise BoundaryError(
-                f"{fspath(source)} is one layer: give it as parcels or as streets (parcels=..., "
-                "streets=...)."
+                f"{fspath(source)} is one layer: give it as parcels (--parcel-layer) or as "
+                "streets (--street-layer)."
             )
         return _of_file(fspath(path), given)
     features = read_features(source)
@@ -169,8 +205,8 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
         chosen = [layer] if layer in fitting else fitting
         if len(chosen) > 1:
             problems.append(
-                f"{path} has several layers of {geometry}s: {', '.join(chosen)}. Say which are the "
-                f"{name}, as in {name}={path}|layername=NAME."
+                f"{path} has several layers of {geometry}s: {', '.join(chosen)}. Give parcels and "
+                f"streets one by one: {name} (--{_FLAGS[name]}) as {path}|layername=NAME."
             )
         elif chosen:
             found[name] = f"{path}|layername={chosen[0]}"
@@ -182,6 +218,10 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
     if problems:
         raise BoundaryError(problems)
     return found
+
+
+_FLAGS = {"parcels": "parcel-layer", "streets": "street-layer"}
+"""What layers are called on the command line."""
 
 
 def _nothing(given: dict[str, Source | None]) -> bool:

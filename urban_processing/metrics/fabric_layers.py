@@ -22,7 +22,14 @@ from urban_processing.metrics.tables import (
     street_columns,
 )
 from urban_processing.schema import BOUNDARY, ISSUES, JUNCTIONS, METRICS, Layer
-from urban_processing.tables import LayerSet, Table, issue_table, make_table, to_map
+from urban_processing.tables import (
+    LayerSet,
+    Table,
+    issue_table,
+    issues_in_words,
+    make_table,
+    to_map,
+)
 
 
 def fabric_layers(known: FabricMeasures) -> LayerSet:
@@ -44,7 +51,7 @@ def fabric_layers(known: FabricMeasures) -> LayerSet:
         tables[STREET_LAND] = _areas(
             STREET_LAND, fabric, fabric.right_of_way, fabric.right_of_way_part
         )
-    tables[ISSUES] = issue_table(fabric.issues, frame)
+    tables[ISSUES] = issue_table(fabric.all_issues, frame)
     tables[METRICS] = metric_table(known.metrics)
     return LayerSet(
         kind=MEASURED_KIND,
@@ -121,6 +128,6 @@ def _summary(known: FabricMeasures) -> list[tuple[str, str]]:
             f"{v['dead_ends']:,.0f} dead ends (besides the rim)",
         )
     )
-    if fabric.issues:
-        rows.append(("issues", f"{len(fabric.issues)} (see the layer issues)"))
+    if fabric.all_issues:
+        rows.append(("issues", f"{issues_in_words(fabric.all_issues)} (see the layer issues)"))
     return rows
