@@ -253,9 +253,7 @@ class ComparedFabrics:
     def issues(self) -> tuple[Issue, ...]:
         """What reading has to say, each with the name of what it is about."""
         return tuple(
-            replace(
-                issue, message=f"{fabric.name}: {issue.message}" if fabric.name else issue.message
-            )
+            replace(issue, message=f"{fabric.name or 'layout'}: {issue.message}")
             for fabric in self.all
             for issue in fabric.issues
         )

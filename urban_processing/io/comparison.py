@@ -19,7 +19,7 @@ from urban_processing.io.osm import ObservedStreets, read_osm_streets
 from urban_processing.params.compare import CompareParams
 from urban_processing.pipelines.measure import side_problems
 from urban_processing.progress import SILENT, Progress
-from urban_processing.site import Site
+from urban_processing.site import Issue, Site
 
 OPEN_STREET_MAP = "OpenStreetMap"
 """What the side is called that is there, if all of it comes from OpenStreetMap."""
@@ -148,7 +148,8 @@ def _real(
     land = asked.land
     if land is None and first is not None:
         land = _land_of(first)
-    streets, said = asked.streets, ()
+    streets = asked.streets
+    said: tuple[Issue, ...] = ()
     try:
         if asked.of_osm:
             observed = _observed(asked, first, params, problems, progress)

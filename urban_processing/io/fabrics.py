@@ -20,7 +20,14 @@ from urban_processing.intake.fabrics import PARCEL_COLUMNS, build_fabric
 from urban_processing.intake.features import Features
 from urban_processing.intake.street_lines import STREET_COLUMNS
 from urban_processing.io.crs import PYPROJ, asked_crs
-from urban_processing.io.features import PARQUET, Source, may_hold, read_features, split_layer_name
+from urban_processing.io.features import (
+    PARQUET,
+    Source,
+    may_hold,
+    must_exist,
+    read_features,
+    split_layer_name,
+)
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers
 from urban_processing.io.layouts import layer_in
@@ -33,7 +40,7 @@ from urban_processing.metrics.measures import LayoutMeasures
 from urban_processing.params.measure import MeasureParams
 from urban_processing.schema import BOUNDARY, PARCELS, STREETS
 
-Measurable: TypeAlias = Source | MeasuredLayout | Layout | GeoLayers | Fabric
+Measurable: TypeAlias = "Source | MeasuredLayout | Layout | GeoLayers | Fabric"
 """What can be measured as it is; see `read_fabric`."""
 
 
@@ -181,18 +188,27 @@ def _of_names(
 
 
 def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | None]:
+    must_exist(path)
+    if path.lower().endswith(OSM):
+        raise BoundaryError(
+            f"{path} is an extract of OpenStreetMap: compare a layout with it (osm_file, "
+            "--osm-file), or give its streets as a layer."
+        )
     text = _state(path, LAYERS_STATE)
     if text is not None:
         kind = json.loads(text)["kind"]
         names = [str(name) for name, _ in pyogrio.list_layers(path)]
         called = f"{path}, which holds {kind}"
         return _of_names(names, lambda layer: f"{path}|layername={layer}", called, given)
-    if path.lower().endswith(PARQUET) or not Path(path).exists():
+    if path.lower().endswith(PARQUET):
         return _of_one_layer(path, given)
     try:
         layers = [(str(name), kind) for name, kind in pyogrio.list_layers(path)]
-    except DataSourceError:
-        return {"parcels": path}  # reading it says what is wrong
+    except DataSourceError as error:
+        raise BoundaryError(
+            f"{path} cannot be read: it is no layout file, and no other file with layers that GDAL "
+            "knows, or it is damaged."
+        ) from error
     found: dict[str, Source | None] = {}
     problems = []
     for name, layer, geometry in (
@@ -222,6 +238,9 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
 
 _FLAGS = {"parcels": "parcel-layer", "streets": "street-layer"}
 """What layers are called on the command line."""
+
+OSM = (".osm", ".osm.bz2", ".osm.gz", ".osm.pbf", ".pbf")
+"""Endings of extracts of OpenStreetMap."""
 
 
 def _nothing(given: dict[str, Source | None]) -> bool:
