@@ -34,7 +34,9 @@ def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) 
         Told how far the work is; may stop it.
     """
     started = time.perf_counter()
-    known = FabricMeasures(fabric)
+    # measuring changes nothing: an earlier one has nothing to tell
+    earlier = tuple(made for made in fabric.history if made.algorithm != _MEASURE)
+    known = FabricMeasures(replace(fabric, history=earlier))
     progress.update(0.1, "Parcels")
     _ = known.parcels, known.block_sides
     progress.update(0.5, "Ways along streets")
@@ -48,8 +50,6 @@ def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) 
         input_sha256=fabric.input_sha256,
         seconds=time.perf_counter() - started,
     )
-    # measuring changes nothing: an earlier one has nothing to tell
-    earlier = [made for made in fabric.history if made.algorithm != _MEASURE]
     measured = FabricMeasures(replace(fabric, history=(*earlier, step)))
     # what is worked out needs not be worked out again
     measured.__dict__.update({k: v for k, v in known.__dict__.items() if k != "fabric"})
