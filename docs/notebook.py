@@ -71,7 +71,7 @@ streets = "../sample_data/osm_liechtenstein.osm.bz2"
 found = up.compare(layout, names=["layout"], osm_file=streets)
 
 figure, axes = plt.subplots(1, 2, figsize=(11, 6), sharex=True, sharey=True)
-for axis, (name, side) in zip(axes, found.sides.items()):
+for axis, (name, side) in zip(axes, found.sides.items(), strict=True):
     side.blocks.plot("area_m2", ax=axis, cmap="YlGnBu", vmin=0, vmax=200_000, alpha=0.6)
     side.streets.plot(ax=axis, color="black", linewidth=0.7)
     axis.set_title(f"{name}: {side.metric('street_km_per_km2'):.1f} km of streets for each km²")
