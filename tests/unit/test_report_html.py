@@ -517,6 +517,34 @@ def test_metrics_of_one_side_stand_apart(reports: dict[str, Report]) -> None:
     assert one_sided(reports["one"]) == one_sided(reports["alike"]) == []
 
 
+def test_no_difference_is_shown_from_a_reference_without_values() -> None:
+    side = side_of(small_grid(), "osm")
+    known = {k: v for k, v in side.values.items() if k != "parcels"}
+    with_parcels = [replace(side_of(small_grid(), name), samples={}) for name in ("a", "b")]
+    report = compared([replace(side, values=known, samples={}), *with_parcels])
+    groups = {g.title: g for g in metric_groups(report)}
+    assert groups["Blocks"].differs
+    some = [line for g in groups.values() for line in g.lines if line.term == "parcels"]
+    assert [line.differences for line in some[:1]] == [(("", ""), ("", ""))]
+    assert report.heading == "osm, a and b"
+
+
+def test_the_better_value_looks_different() -> None:
+    side = replace(side_of(small_grid(), "a"), samples={})
+    sides = [replace(side, values={"p_area": 1.0512}), replace(side, values={"p_area": 1.0514})]
+    (group_,) = metric_groups(compared([sides[0], replace(sides[1], name="b")]))
+    assert group_.lines[0].values == ("1.0512", "1.0514")
+    assert group_.lines[0].better == 0
+
+
+def test_land_without_streets_says_so() -> None:
+    side = replace(side_of(small_grid()), values={"blocks": 0.0, "street_length_m": 0.0})
+    text = report_html(Report((side,)))
+    assert "<dd>none.</dd>" in text
+    assert "<dd>none inside the land.</dd>" in text
+    assert "longer than not known" not in text
+
+
 def test_differences_are_told_in_percent_or_points() -> None:
     side = side_of(small_grid(), "a")
     known = {"area_m2": 200.0, "quads_pct": 50.0, "dead_ends": 0.0, "circuity": 1.0}

@@ -11,7 +11,6 @@ import shapely
 
 from urban_processing.report.html.digits import number, share, with_unit
 from urban_processing.report.html.model import Report, ReportSide
-from urban_processing.report.html.summary import listed
 from urban_processing.report.html.svg import (
     Canvas,
     FloatArray,
@@ -19,7 +18,7 @@ from urban_processing.report.html.svg import (
     line_paths,
     stage_of,
 )
-from urban_processing.report.html.text import isolate
+from urban_processing.report.html.text import isolate, listed
 from urban_processing.report.html.themes import HATCHED, IntArray, Theme, themes
 from urban_processing.report.palette import OUTLINE, PLAIN_CASING, PLAIN_STREET, SURFACE, Scale
 from urban_processing.tables import Table

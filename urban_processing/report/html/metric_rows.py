@@ -51,6 +51,11 @@ class MetricGroup:
     title: str
     lines: tuple[MetricLine, ...]
 
+    @property
+    def differs(self) -> bool:
+        """Whether a difference is known: none is where the reference has no values."""
+        return any(text for line in self.lines for text, _ in line.differences)
+
 
 @dataclass(frozen=True)
 class OneSided:
@@ -122,7 +127,7 @@ def _grouped(rows: Sequence[MetricRow], reference: int | None) -> list[MetricGro
 
 def _lines(rows: Iterable[MetricRow], reference: int | None) -> Iterable[MetricLine]:
     for row in rows:
-        decimals = decimals_for(row.values)
+        decimals = _decimals(row)
         yield MetricLine(
             row.spec.name,
             label(row.name),
@@ -135,6 +140,19 @@ def _lines(rows: Iterable[MetricRow], reference: int | None) -> Iterable[MetricL
             ),
             row.better,
         )
+
+
+def _decimals(row: MetricRow) -> int:
+    """So many that what is better looks different from the rest, as far as that goes."""
+    decimals = decimals_for(row.values)
+    if row.better is None:
+        return decimals
+    best, *rest = row.values[row.better], *row.values[: row.better], *row.values[row.better + 1 :]
+    while decimals < MOST_DECIMALS and number(best, decimals) in [
+        number(v, decimals) for v in rest
+    ]:
+        decimals += 1
+    return decimals
 
 
 def _relative(row: MetricRow, difference: float, reference: int) -> str:

@@ -17,8 +17,8 @@ from urban_processing.report.html.metric_rows import metric_groups, one_sided, p
 from urban_processing.report.html.model import Report
 from urban_processing.report.html.records import check_lines, issue_list, step_lines
 from urban_processing.report.html.sentences import BETTER, FIGURES, first_figures
-from urban_processing.report.html.summary import listed, verdict
-from urban_processing.report.html.text import isolate, shown
+from urban_processing.report.html.summary import verdict
+from urban_processing.report.html.text import isolate, listed, shown
 from urban_processing.version import __version__
 
 if TYPE_CHECKING:

@@ -75,6 +75,16 @@ def _of(values: Values, name: str, unit: str = "", decimals: int | None = None) 
     return "not known" if math.isnan(value) else with_unit(value, unit, decimals)
 
 
+def _blocks(v: Values) -> str:
+    n = number(v["blocks"])
+    if not math.isfinite(v.get("block_length_median_m", math.nan)):
+        return n if v["blocks"] else "none"
+    return (
+        f"{n}, half of them longer than {_of(v, 'block_length_median_m', 'm', 0)}, the longest "
+        f"{_of(v, 'block_length_max_m', 'm', 0)}"
+    )
+
+
 FIGURES: tuple[Figure, ...] = (
     Figure("Land", "area_m2", _area),
     Figure(
@@ -108,11 +118,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure(
         "Blocks",
         "blocks",
-        lambda v: (
-            f"{number(v['blocks'])}, half of them longer than "
-            f"{_of(v, 'block_length_median_m', 'm', 0)}, the longest "
-            f"{_of(v, 'block_length_max_m', 'm', 0)}"
-        ),
+        _blocks,
     ),
     Figure(
         "Streets",
@@ -120,6 +126,8 @@ FIGURES: tuple[Figure, ...] = (
         lambda v: (
             f"{with_unit(v['street_length_m'] / 1000, 'km', 1)} inside the land, "
             f"{_of(v, 'street_km_per_km2', 'km', 1)} for each km²"
+            if v["street_length_m"]
+            else "none inside the land"
         ),
     ),
     Figure(

@@ -8,6 +8,7 @@ from urban_processing.metrics.comparison import Comparison, DistributionDistance
 from urban_processing.metrics.comparison_words import judged_rows, largest_distances
 from urban_processing.report.html.digits import decimals_for, number, with_unit
 from urban_processing.report.html.labels import label
+from urban_processing.report.html.text import listed
 
 MOST_NAMED = 6
 """Metrics that are named of a side; of the others it is said how many there are."""
@@ -19,15 +20,6 @@ def verdict(comparison: Comparison, names: tuple[str, ...]) -> list[tuple[str, s
     First who is better and in what, then which distributions differ, and how far.
     """
     return [*_better(comparison, names), *_distributions(comparison, names)]
-
-
-def listed(texts: list[str]) -> str:
-    """Return texts as a list in a sentence.
-
-    >>> listed(["a"]), listed(["a", "b", "c"])
-    ('a', 'a, b and c')
-    """
-    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def _better(comparison: Comparison, names: tuple[str, ...]) -> list[tuple[str, str]]:
