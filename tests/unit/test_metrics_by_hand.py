@@ -159,7 +159,7 @@ def crossing() -> tuple[Layout, dict[str, float]]:
         "p_area": 1,
         "undesirable_pct": 0,
         "undesirable": 0,
-        "neighbours_mean": 2,
+        "neighbours_mean": 0,  # a street lies between any two
         "through_lots": 4,
         "through_lots_pct": 100,
         "area_mean_m2": 6000,
@@ -285,7 +285,8 @@ def dead_end() -> tuple[Layout, dict[str, float]]:
         "p_area": 1,
         "undesirable_pct": 0,
         "undesirable": 0,
-        "neighbours_mean": 2 * (2 * 3 + 4) / 8,  # six borders along the rows, four across
+        # borders without a street: four along the rows, three across
+        "neighbours_mean": 2 * (2 * 2 + 3) / 8,
         "through_lots": 2,  # beside the dead end
         "through_lots_pct": 25,
         "area_mean_m2": 2000,
@@ -414,7 +415,8 @@ def entries() -> tuple[Layout, dict[str, float]]:
         "p_area": 1,
         "undesirable_pct": 0,
         "undesirable": 0,
-        "neighbours_mean": 2 * (3 * 3 + 2 * 4) / 12,
+        # borders without a street: three, two and two along the rows, four across
+        "neighbours_mean": 2 * (3 + 2 + 2 + 4) / 12,
         "through_lots": 0,
         "through_lots_pct": 0,
         "area_mean_m2": 900,
@@ -480,7 +482,7 @@ def entries() -> tuple[Layout, dict[str, float]]:
         "thinness_mean_interior": 1,
         "thinness_min_interior": 1,
         "p_area_interior": 1,
-        "neighbours_mean_interior": 4,
+        "neighbours_mean_interior": 2,  # a street each to the south and to the middle
         "area_mean_m2_interior": 900,
         "area_min_over_mean_interior": 1,
         "area_max_over_min_area_interior": 2.25,

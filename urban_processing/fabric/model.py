@@ -13,6 +13,7 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.provenance import Step
 from urban_processing.site import Frame, Issue
+from urban_processing.streets.block_length import BlockSides
 from urban_processing.streets.network_model import Linework, StreetNetwork
 
 NO_BLOCK = -1
@@ -129,10 +130,13 @@ class FabricBlocks:
         (B,) their outlines.
     part
         (B,) piece of the land that each lies in.
+    sides
+        Their longest sides, where they are known already.
     """
 
     polygons: Geometries
     part: IntArray
+    sides: BlockSides | None = None
 
     def __len__(self) -> int:
         """Return the number of blocks."""

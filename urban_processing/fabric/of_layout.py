@@ -17,6 +17,7 @@ from urban_processing.fabric.model import (
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray
 from urban_processing.rights_of_way import RightsOfWay
+from urban_processing.streets.block_length import BlockSides
 from urban_processing.streets.network_model import StreetNetwork
 
 
@@ -25,7 +26,7 @@ def fabric_of_layout(
     *,
     network: StreetNetwork,
     rights_of_way: RightsOfWay | None,
-    outlines: Geometries,
+    sides: BlockSides,
 ) -> Fabric:
     """Return a layout as a fabric.
 
@@ -37,8 +38,8 @@ def fabric_of_layout(
         Its street network.
     rights_of_way
         Its rights-of-way, where they are laid out.
-    outlines
-        (B,) outlines of its blocks, in the order of `Layout.face_block`.
+    sides
+        Longest sides and outlines of its blocks, in the order of `Layout.face_block`.
     """
     mesh = layout.mesh
     _, first = np.unique(layout.face_block, return_index=True)
@@ -50,7 +51,7 @@ def fabric_of_layout(
         land_part=land_part,
         lines=mesh,
         network=network,
-        blocks=FabricBlocks(outlines, layout.face_part[first]),
+        blocks=FabricBlocks(sides.outline, layout.face_part[first], sides),
         parcels=FabricParcels(
             rings=layout_rings(layout),
             parcel_id=np.arange(1, mesh.n_faces + 1),

@@ -67,7 +67,13 @@ DISTRIBUTIONS: tuple[DistributionSpec, ...] = (
         "",
         "Length of a block: of its longest side, from corner to corner along the boundary.",
     ),
-    DistributionSpec("parcel_area_m2", "Area of parcels", "m²", _VANEGAS, "Area of a parcel."),
+    DistributionSpec(
+        "parcel_area_m2",
+        "Area of parcels",
+        "m²",
+        _VANEGAS,
+        "Area of a parcel, less right-of-way where that is known.",
+    ),
     DistributionSpec(
         "parcel_width_m",
         "Width of parcels",

@@ -54,8 +54,10 @@ class FabricMeasures:
     @cached_property
     def block_sides(self) -> BlockSides | None:
         """The blocks' outlines, lengths and longest sides; None where there are no blocks."""
-        blocks = self.fabric.blocks.polygons
-        return longest_sides(blocks, np.arange(len(blocks))) if len(blocks) else None
+        blocks = self.fabric.blocks
+        if blocks.sides is not None or not len(blocks):
+            return blocks.sides
+        return longest_sides(blocks.polygons, np.arange(len(blocks)))
 
     @cached_property
     def segments(self) -> Segments:
@@ -131,11 +133,11 @@ class LayoutMeasures:
             self.layout,
             network=self.network,
             rights_of_way=self.rights_of_way,
-            outlines=self.block_sides.outline,
+            sides=self.block_sides,
         )
         known = FabricMeasures(fabric)
-        # what is cached needs not be worked out again
-        known.__dict__.update(parcels=self.parcels, block_sides=self.block_sides)
+        if "parcels" in self.__dict__:  # what is cached needs not be worked out again
+            known.__dict__["parcels"] = self.parcels
         return known
 
 

@@ -132,7 +132,10 @@ METRICS: tuple[MetricSpec, ...] = (
     ),
     _parcels("undesirable", "", _YANG, "Parcels with p_angle above 15° or p_area above 1.2."),
     _parcels(
-        "neighbours_mean", "", "Vanegas 2012, section 6", "Mean number of parcels beside a parcel."
+        "neighbours_mean",
+        "",
+        "Vanegas 2012, section 6",
+        "Mean number of parcels beside a parcel, with no street between.",
     ),
     _parcels("through_lots", "", "", "Parcels with frontage on two opposite sides."),
     _parcels(
