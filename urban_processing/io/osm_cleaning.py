@@ -30,9 +30,9 @@ ROUNDABOUT = 5e3
 away whose only neighbours are such."""
 
 LONG_FACE = 2e4
-"""Area in m² up to which a long face beside an artifact is one, too: such faces are wider than 29 m,
-and 43 m at most where this is their area; neatnet's 100,000 takes blocks between parallel streets
-away, with the dead ends in them."""
+"""Area in m² up to which a long face beside an artifact is one, too: those of this area are 43 m
+wide at most; neatnet's 100,000 takes blocks between parallel streets away, with the dead ends in
+them."""
 
 REACH = 30.0
 """Metres within which the end of a motorway's slip road follows a street that was moved."""
