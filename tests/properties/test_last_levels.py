@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from lands import LANDS, holed, site_of, star
+from lands import LANDS, ellipse, holed, site_of, star
 
 from urban_processing.blocks.model import UNKNOWN_STREET, BlockRings
 from urban_processing.errors import ParameterError
@@ -43,18 +41,12 @@ def must_hold(layout: Layout, min_area: float) -> None:
     assert layout.mesh.face_area[free].min() >= min_area * (1 - 1e-9)
 
 
-@cache
-def plain_faces(name: str) -> int:
-    """Number of parcels of a land without another strategy."""
-    return run(site_of(LANDS[name]), min_area=1500).mesh.n_faces
-
-
 @pytest.mark.parametrize("name", sorted(LANDS))
 @pytest.mark.parametrize("strategy", OTHERS)
 def test_certificate_holds(name: str, strategy: Strategy) -> None:
-    layout = run(site_of(LANDS[name]), min_area=1500, strategy=strategy)
-    must_hold(layout, 1500)
-    assert layout.mesh.n_faces > 0.6 * plain_faces(name)
+    layout = run(site_of(LANDS[name]), min_area=3000, strategy=strategy)
+    must_hold(layout, 3000)
+    assert layout.mesh.n_faces > 0.4 * LANDS[name].area / 3000
 
 
 @FEW
@@ -68,9 +60,9 @@ def test_certificate_holds(name: str, strategy: Strategy) -> None:
 def test_any_land(
     seed: int, corners: int, levels: int, strategy: Strategy, pattern: StreetPattern
 ) -> None:
-    site = site_of(star(seed, n=corners, size=200))
+    site = site_of(star(seed, n=corners, size=150))
     must_hold(
-        run(site, min_area=1200, strategy=strategy, last_levels=levels, pattern=pattern), 1200
+        run(site, min_area=1000, strategy=strategy, last_levels=levels, pattern=pattern), 1000
     )
 
 
@@ -136,7 +128,7 @@ def test_joined_pieces_tile_the_land(seed: int, corners: int, times: float) -> N
 def test_hybrid_keeps_the_smallest_area(
     seed: int, corners: int, levels: int, min_area: float
 ) -> None:
-    site = site_of(star(seed, n=corners))
+    site = site_of(star(seed, n=corners, size=200))
     values = {"strategy": "hybrid", "last_levels": levels, "optimize": False}
     must_hold(run(site, min_area=min_area, **values), min_area)
 
@@ -148,8 +140,8 @@ def test_holes_locked_land_and_given_streets_stay() -> None:
     site = Site(
         parts=site.parts, fixed_streets=(across,), locked=(estate,), obstacles=site.obstacles
     )
-    layout = run(site, min_area=900, strategy="skeleton")
-    must_hold(layout, 900)
+    layout = run(site, min_area=1800, strategy="skeleton")
+    must_hold(layout, 1800)
     (locked,) = np.flatnonzero(layout.face_locked).tolist()
     assert layout.mesh.face_polygons()[locked].area == pytest.approx(8000, rel=1e-3)
     assert layout.land_uses[layout.face_use[locked]] == "estate"
@@ -159,7 +151,7 @@ def test_holes_locked_land_and_given_streets_stay() -> None:
 
 
 def test_the_same_seed_gives_the_same_layout() -> None:
-    site = site_of(LANDS["ellipse"])
+    site = site_of(ellipse(150, 100))
     a, b = (run(site, min_area=1500, strategy="obb", seed=5) for _ in range(2))
     assert np.array_equal(a.mesh.xy, b.mesh.xy)
     assert np.array_equal(a.edge_street, b.edge_street)
@@ -168,7 +160,7 @@ def test_the_same_seed_gives_the_same_layout() -> None:
 
 
 def test_rows_of_parcels_are_square_to_the_street() -> None:
-    layout = run(site_of(shapely.box(0, 0, 500, 400)), min_area=700, strategy="skeleton")
+    layout = run(site_of(shapely.box(0, 0, 300, 240)), min_area=700, strategy="skeleton")
     measured = measure_parcels(layout)
     assert (measured.sides == 4).mean() > 0.95
     assert np.median(measured.angle_deviation) < 1.0

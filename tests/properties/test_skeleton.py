@@ -74,6 +74,13 @@ def assert_skeleton(skeleton: Skeleton, xy: np.ndarray, offsets: np.ndarray) -> 
     assert np.array_equal(skeleton.xy[n:] / FINE_GRID, np.round(skeleton.xy[n:] / FINE_GRID))
     following = np.arange(1, n + 1)
     following[offsets[1:] - 1] = offsets[:-1]
+    assert np.array_equal(xy[skeleton.following], xy[following])
+    following = skeleton.following
+    # faces share their vertices by number
+    edges = {
+        (u, v) for face in skeleton.faces for u, v in zip(face, np.roll(face, -1), strict=True)
+    }
+    assert {(u, v) for u, v in edges if (v, u) not in edges} == set(enumerate(following))
     for k, face in enumerate(skeleton.faces):
         run = np.flatnonzero(skeleton.edge_face == k)
         count = len(run) + 1

@@ -10,6 +10,7 @@ import shapely
 from urban_processing.blocks.model import plain_blocks
 from urban_processing.hashing import splitmix64
 from urban_processing.mesh.build import canonical_rings
+from urban_processing.mesh.touches import joined_at_touches
 from urban_processing.parcelling.ground import Ground, Pieces, Rules
 from urban_processing.site import snap_to_grid
 
@@ -67,7 +68,7 @@ def assert_tiled(pieces: Pieces, ground: Ground, *, close: float = 1e-9) -> None
     np.testing.assert_allclose(area, shapely.area(land), rtol=close)
     for block, polygon in enumerate(land):
         own = faces[pieces.block == block]
-        assert shapely.coverage_is_valid(own), f"polygon {block} is no coverage"
+        assert shapely.coverage_is_valid(joined_at_touches(own)), f"polygon {block} is no coverage"
         outline = shapely.union_all(own)
         assert shapely.hausdorff_distance(outline, polygon) < 1e-7
     np.testing.assert_array_equal(pieces.xy[: len(ground.rings.xy)], ground.rings.xy)
@@ -128,6 +129,24 @@ def with_holes(rng: np.random.Generator, n: int):
         shape = shapely.difference(shape, hole)
     parts = shapely.get_parts(shape)
     return _clean_all(parts[np.argmax(shapely.area(parts))])
+
+
+def with_touching_holes(rng: np.random.Generator, n: int):
+    """A polygon with holes that touch its shell, or each other, at vertices."""
+    shape = star(rng, 7, inner=0.6) if rng.random() < 0.5 else rectilinear(rng, 12)
+    for _ in range(n):
+        spots = shapely.get_coordinates(shape)
+        spot = spots[rng.integers(len(spots))]
+        size = rng.choice([1.0, 8.0, 25.0])
+        turn = rng.uniform(0, 2 * np.pi) + np.sort(rng.uniform(0, rng.choice([0.2, 2.0]), 3))
+        far = size * rng.uniform(0.3, 1, 3)
+        ends = snap_to_grid(spot + far[:, None] * np.column_stack([np.cos(turn), np.sin(turn)]))
+        hole = np.vstack([spot, ends])
+        holes = [shapely.get_coordinates(ring) for ring in shape.interiors]
+        holed = shapely.Polygon(shape.exterior, [*holes, hole])
+        if shapely.is_valid(holed):
+            shape = holed
+    return shape
 
 
 def with_tiny_edges(rng: np.random.Generator, n: int):

@@ -96,3 +96,99 @@ def test_all_mistakes_are_reported_together() -> None:
         up.cogenerate(shapely.box(0, 0, 300, 200))
     with pytest.raises(BoundaryError):
         up.cogenerate("/no/such.gpkg", min_area=400)
+
+
+# ---- geometries on a plane without CRS go from one function to the next
+
+STREETS = [
+    shapely.box(0, 0, 200, 150).exterior,
+    shapely.LineString([(0, 70), (200, 80)]),
+    shapely.LineString([(90, 0), (80, 150)]),
+]
+
+
+@pytest.fixture(scope="module")
+def plane() -> tuple[up.GeoLayers, up.GeoLayers]:
+    """Blocks of bare lines, and their subdivision."""
+    found = up.find_blocks(STREETS, default_width=8)
+    return found, up.subdivide(found, min_area=600)
+
+
+@pytest.fixture(scope="module")
+def bare_layout() -> up.GeoLayout:
+    return up.cogenerate(shapely.box(0, 0, 200, 150), min_area=2000)
+
+
+def test_blocks_of_bare_lines_are_subdivided(plane: tuple[up.GeoLayers, up.GeoLayers]) -> None:
+    found, made = plane
+    assert made.parcels.crs is None
+    assert made.parcels.area_m2.sum() == pytest.approx(found.blocks.area_m2.sum())
+    for blocks in (found.blocks, found.blocks[found.blocks.area_m2 > 0], found.blocks.copy()):
+        again = up.subdivide(blocks, streets=found.block_edges, min_area=600)
+        assert again.parcels.geometry.geom_equals_exact(made.parcels.geometry, 0).all()
+    one = up.subdivide(found.blocks.geometry.iloc[:1], min_area=600)
+    assert one.blocks.area_m2.tolist() == found.blocks.area_m2.tolist()[:1]
+    kept = up.subdivide(found, previous=made, min_area=600)
+    assert (kept.changes.change == "kept").all()
+
+
+def test_bare_parcels_are_calibrated_and_their_blocks_subdivided(
+    plane: tuple[up.GeoLayers, up.GeoLayers],
+) -> None:
+    found, made = plane
+    bare = list(made.parcels.geometry)
+    for measured in (
+        up.calibrate(bare),
+        up.calibrate(made),
+        up.calibrate(made.parcels, found.blocks),
+        up.calibrate(bare, found),
+    ):
+        assert measured.crs is None
+        again = up.subdivide(measured)
+        assert len(again.blocks) == len(found.blocks)
+        assert len(again.parcels) == pytest.approx(len(made.parcels), rel=0.3)
+
+
+def test_a_bare_layout_is_optimized_from_its_frames(bare_layout: up.GeoLayout) -> None:
+    layout = bare_layout
+    again = up.optimize(parcels=layout.parcels, streets=layout.streets)
+    assert again.crs is None
+    assert len(again.parcels) == len(layout.parcels)
+    assert again.certificate.holds, again.certificate.failures
+    assert not [i for i in again.issues.message if "CRS" in i]
+    land = up.cogenerate(layout.boundary, streets=layout.streets, min_area=2500)
+    assert land.crs is None
+    assert land.metric("area_m2") == pytest.approx(layout.metric("area_m2"))
+
+
+def test_bare_parcels_are_transferred(
+    plane: tuple[up.GeoLayers, up.GeoLayers], bare_layout: up.GeoLayout
+) -> None:
+    _, made = plane
+    assert len(up.transfer(made, made).parcels) == len(made.parcels)
+    assert len(up.transfer(made.parcels, bare_layout.parcels).parcels) == len(bare_layout.parcels)
+
+
+def test_frames_of_the_user_need_a_crs(
+    plane: tuple[up.GeoLayers, up.GeoLayers], bare_layout: up.GeoLayout
+) -> None:
+    own = gpd.GeoDataFrame(geometry=list(plane[0].blocks.geometry))
+    lines = gpd.GeoDataFrame(geometry=list(bare_layout.streets.geometry))
+    for call in (
+        lambda: up.subdivide(own, min_area=600),
+        lambda: up.subdivide(own.geometry, min_area=600),
+        lambda: up.calibrate(own),
+        lambda: up.cogenerate(own, min_area=2000),
+        lambda: up.find_blocks(lines),
+        lambda: up.optimize(parcels=own, streets=lines),
+        lambda: up.transfer(own, own),
+    ):
+        with pytest.raises(BoundaryError, match="CRS"):
+            call()
+
+
+def test_only_frames_without_crs_are_marked(sample: Sample) -> None:
+    layout = up.cogenerate(sample("rect"), parcels=12)
+    stripped = layout.parcels.set_crs(None, allow_override=True)
+    with pytest.raises(BoundaryError, match="no CRS"):
+        up.optimize(parcels=stripped, streets=layout.streets)

@@ -197,3 +197,16 @@ def test_tables_are_certified_without_the_layout() -> None:
 def test_a_layout_without_streets_fails() -> None:
     result = certificate(grid(2, 2, rim=False, origin=ORIGIN))
     assert failed(result) == {"reached", "streets_connected"}
+
+
+def test_a_parcel_around_a_lake_that_touches_its_side_holds() -> None:
+    lake = [(20, 20), (14, 32), (26, 32)]
+    upper = shapely.Polygon([(0, 20), (20, 20), (40, 20), (40, 60), (0, 60)], [lake])
+    lower = shapely.Polygon([(0, 0), (20, 0), (20, 20), (0, 20)])
+    # GEOS itself calls the lower one invalid where the lake touches
+    assert not shapely.coverage_is_valid([upper, lower])
+    layout = layout_of([upper, lower], origin=ORIGIN)
+    assert certificate(layout).check("coverage").holds
+    over = shapely.Polygon([(0, 0), (20, 0), (20, 20), (19, 23), (0, 20)])
+    edited = certify_edited(layout, parcels={1: over})
+    assert edited.check("coverage").offenders == (1, 2)

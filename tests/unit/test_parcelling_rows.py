@@ -33,6 +33,7 @@ def polygon_of(shape: shapely.Polygon, **known: list[float]) -> Polygon:
         shift=np.zeros(2),
         xy=rings.xy,
         offsets=rings.offsets,
+        place=rings.place.tolist(),
         access=known.get("access", [True] * n),
         width=known.get("width", [math.nan] * n),
         street=known.get("street", [-1] * n),

@@ -13,6 +13,7 @@ import shapely
 
 from urban_processing.mesh.corners import ring_neighbours
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.touches import turns_at_touches
 from urban_processing.site import Frame, Issue
 
 UNKNOWN_STREET = -1
@@ -105,6 +106,32 @@ class BlockRings:
     def following(self) -> IntArray:
         """(N,) next vertex in the ring of each vertex."""
         return ring_neighbours(self.offsets)[1]
+
+    @cached_property
+    def place(self) -> IntArray:
+        """(N,) first vertex of the same block at the place of each: several where rings touch."""
+        out = np.arange(len(self.xy))
+        holed = np.bincount(self.block)[self.edge_block] > 1
+        there = np.flatnonzero(holed)
+        if len(there):
+            places = np.column_stack([self.edge_block, self.xy])[there] + 0.0
+            _, first, inverse = np.unique(places, axis=0, return_index=True, return_inverse=True)
+            out[there] = there[first[inverse.ravel()]]
+        return out
+
+    @cached_property
+    def along_land(self) -> IntArray:
+        """(N,) next vertex along the land, as `turns_at_touches` says; else as `following`."""
+        after = self.following.copy()
+        block = self.edge_block
+        for k in np.unique(block[self.place != np.arange(len(block))]).tolist():
+            low, high = np.searchsorted(self.block, [k, k + 1]).tolist()
+            offsets = self.offsets[low : high + 1]
+            first, stop = int(offsets[0]), int(offsets[-1])
+            points = [(x, y) for x, y in self.xy[first:stop].tolist()]
+            after[first:stop] = turns_at_touches(points, (offsets - first).tolist())
+            after[first:stop] += first
+        return after
 
     def of(self, rows: IntArray) -> tuple[BlockRings, IntArray]:
         """Return the rings of some polygons, in that order, and their edges in this one."""

@@ -26,7 +26,7 @@ class Features(Generic[C]):
     name
         What to call the source in messages.
     bare
-        Whether the source cannot carry a CRS (shapely geometries).
+        Whether the source cannot carry a CRS (shapely geometries, and what was made of them).
     columns
         (n,) values of those attributes that were asked for and are there, by name.
     """

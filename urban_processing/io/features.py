@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 Source: TypeAlias = "str | PathLike[str] | geopandas.GeoDataFrame | geopandas.GeoSeries | Any"
 """A path, a GeoDataFrame, a GeoSeries, a shapely geometry or a sequence of them."""
 
+PLANE = "urban_processing_plane"
+"""Attribute (`DataFrame.attrs`) of frames that were made of geometries on a plane without CRS."""
+
 PARQUET = (".parquet", ".geoparquet", ".pq")
 _PREFERRED_LAYER = "boundary"
 
@@ -68,10 +71,12 @@ def read_features(
         )
     geometry = getattr(source, "geometry", None)
     if geometry is not None and hasattr(source, "crs"):
+        crs = _usable(source.crs)
         return Features(
             np.asarray(geometry, dtype=object),
-            _usable(source.crs),
+            crs,
             "The frame",
+            bare=crs is None and bool(source.attrs.get(PLANE)),
             columns=_columns_of(source, columns),
         )
     return Features(_as_geometries(source), None, "The geometry", bare=True)

@@ -11,6 +11,7 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 
+from urban_processing.io.features import PLANE
 from urban_processing.metrics import MeasuredLayout
 from urban_processing.schema import PROVENANCE, ColumnType, GeometryType, Layer, layer
 from urban_processing.tables import LayerSet, Table
@@ -221,7 +222,10 @@ class GeoLayers:
 def table_frame(
     declared: Layer, table: Table | None, *, crs: str
 ) -> gpd.GeoDataFrame | pd.DataFrame:
-    """Return a table as a frame: whole numbers that may be missing as Int64."""
+    """Return a table as a frame: whole numbers that may be missing as Int64.
+
+    One without CRS is marked, so that it can be given on like the bare geometries it comes from.
+    """
     columns: dict[str, Any] = {}
     for column in declared.columns:
         values = np.empty(0, dtype=object) if table is None else table[column.name]
@@ -235,4 +239,7 @@ def table_frame(
         return pd.DataFrame(columns)
     known = None if table is None else table.geometry
     geometry = np.empty(0, dtype=object) if known is None else known
-    return gpd.GeoDataFrame(columns, geometry=gpd.GeoSeries(geometry, crs=crs or None))
+    frame = gpd.GeoDataFrame(columns, geometry=gpd.GeoSeries(geometry, crs=crs or None))
+    if not crs:
+        frame.attrs[PLANE] = True
+    return frame

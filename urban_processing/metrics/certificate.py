@@ -21,6 +21,7 @@ from urban_processing.mesh.overlap import (
     unmatched_segments,
 )
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.touches import joined_at_touches
 from urban_processing.metrics.tables import (
     boundary_table,
     net_parcel_table,
@@ -208,7 +209,7 @@ def _valid(ids: IntArray, usable: BoolArray) -> Check:
 
 def _coverage(ids: IntArray, polygons: npt.NDArray[np.object_]) -> Check:
     """Neighbours share their boundaries vertex by vertex; overlaps break this."""
-    edges = shapely.coverage_invalid_edges(polygons)
+    edges = shapely.coverage_invalid_edges(joined_at_touches(polygons))
     bad = ids[~shapely.is_empty(edges)]
     return _check(
         "coverage", len(bad), 0, "parcels that overlap others or do not match their boundaries", bad

@@ -110,17 +110,35 @@ def _outline_edges(sub: Pieces, ground: Rings) -> IntArray:
     n = len(sub.xy)
     forth, back = sub.vertex * n + head, head * n + sub.vertex
     outer = np.flatnonzero(~np.isin(forth, back))
+    place = _places(ground)
     at = np.full(n, -1)
     at[sub.vertex[outer]] = outer
     out = np.full(len(sub.vertex), -1)
     edge = np.arange(len(ground.vertex))
-    here = edge  # vertices of the ground come first, and a vertex added lies on one edge alone
+    along = at[place]
+    touch = np.bincount(sub.vertex[outer], minlength=n)[place] > 1
+    for k in np.flatnonzero(touch).tolist():
+        ahead = outer[sub.vertex[outer] == place[k]]
+        way = _unit(sub.xy[ground.following[k]] - sub.xy[k])
+        along[k] = ahead[np.argmax(_unit(sub.xy[head[ahead]] - sub.xy[k]) @ way)]
     while len(edge):
-        out[at[here]] = edge
-        here = head[at[here]]
-        going = here != ground.following[edge]
-        edge, here = edge[going], here[going]
+        out[along] = edge
+        here = head[along]
+        going = here != place[ground.following[edge]]
+        # a vertex added lies on one edge alone
+        edge, along = edge[going], at[here[going]]
     return out
+
+
+def _places(ground: Rings) -> IntArray:
+    """(N,) first of the nodes of a face that are the same vertex."""
+    key = ground.edge_face * (ground.vertex.max() + 1) + ground.vertex
+    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    return np.asarray(first[inverse.ravel()])
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.hypot(vectors[..., 0], vectors[..., 1])[..., None])
 
 
 def _pairs(tail: IntArray, head: IntArray) -> tuple[IntArray, IntArray]:

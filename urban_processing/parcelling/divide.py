@@ -59,7 +59,7 @@ def divide(ground: Ground, wanted: BlockRules, *, seed: int) -> Pieces:
 
 
 def _with_whole_divided(pieces: Pieces, rules: Rules, *, seed: int) -> Pieces:
-    """Divide by boxes what rows have left whole: a contour that touches itself has no skeleton."""
+    """Divide by boxes what rows have left whole: contours that touch an edge have no skeleton."""
     whole = np.bincount(pieces.block)[pieces.block] == 1
     at_street = np.bincount(pieces.edge_face, weights=pieces.access) > 0
     doubtful = np.flatnonzero(whole & at_street)

@@ -105,7 +105,8 @@ class Pieces:
         (V, 2) vertices: first those of the ground in their order, then those added, on
         `FINE_GRID`.
     vertex
-        (N,) vertices of all rings, one after the other; shells counter-clockwise.
+        (N,) vertices of all rings, one after the other; shells counter-clockwise. Of vertices of
+        the ground at one place, where its rings touch, it is the first (`BlockRings.place`).
     offsets
         (R + 1,) where rings begin in `vertex`.
     face

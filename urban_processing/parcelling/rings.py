@@ -11,6 +11,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.touches import loops_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +127,36 @@ class Rings:
         doubtful = np.flatnonzero(~valid)
         if len(doubtful):
             valid[doubtful] = shapely.is_valid(self.take(doubtful).polygons(xy))
+            doubtful = doubtful[~valid[doubtful]]
+        if len(doubtful):
+            valid[doubtful] = shapely.is_valid(self.take(doubtful).parted(xy).polygons(xy))
         return np.asarray(valid)
+
+    def parted(self, xy: FloatArray) -> Rings:
+        """Return the rings taken apart where they come to a vertex again; shells first.
+
+        Those of a face do so where holes of the ground touch another of its rings.
+        """
+        ring = np.arange(len(self.face)).repeat(self.size)
+        if len(np.unique(ring * (self.vertex.max() + 1) + self.vertex)) == len(ring):
+            return self
+        vertex = self.vertex.tolist()
+        loops = [
+            (face, loop)
+            for face, a, b in zip(self.face, self.offsets[:-1], self.offsets[1:], strict=True)
+            for loop in loops_of(range(a, b), vertex)
+        ]
+        size = np.array([len(loop) for _, loop in loops])
+        node = np.concatenate([loop for _, loop in loops])
+        made = Rings(
+            vertex=self.vertex[node],
+            segment=self.segment[node],
+            offsets=starts(size),
+            face=np.array([face for face, _ in loops]),
+        )
+        order = np.lexsort((-made.signed_areas(xy), made.face))
+        node = ranges(made.offsets[order], size[order])
+        return Rings(made.vertex[node], made.segment[node], starts(size[order]), made.face[order])
 
 
 def join_rings(parts: Sequence[Rings]) -> Rings:

@@ -121,21 +121,19 @@ def _street_edges(
 ) -> npt.NDArray[np.bool_]:
     """(E,) edges of the mesh that are street sides of the ground."""
     number = _numbers(mesh.xy, xy)
-    after = np.full(len(xy) + 1, -1)
-    after[: len(xy)] = np.where(ground.access, rings.following, -1)
+    n = len(xy) + 1
+    sides = rings.place * n + rings.place[rings.following]
     start, end = number[mesh.origin], number[mesh.target]
-    runs = (start >= 0) & (after[start] == end) & (end >= 0)
+    runs = np.isin(start * n + end, sides[ground.access]) & (start >= 0) & (end >= 0)
     return np.asarray(runs.reshape(-1, 2).any(axis=1))
 
 
 def _numbers(places: FloatArray, known: FloatArray) -> IntArray:
-    """(n,) which of the known places each is; -1 for none."""
+    """(n,) which of the known places each is, the first of those that are the same; -1 for none."""
     both = np.concatenate([known, places]) + 0.0
-    _, inverse = np.unique(both, axis=0, return_inverse=True)
-    inverse = inverse.ravel()
-    first = np.full(inverse.max() + 1, -1)
-    first[inverse[: len(known)]] = np.arange(len(known))
-    return first[inverse[len(known) :]]
+    _, first, inverse = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    number = first[inverse.ravel()[len(known) :]]
+    return np.where(number < len(known), number, -1)
 
 
 def _pieces(layout: Layout, ground: Ground, place: FloatArray) -> Pieces:
@@ -171,7 +169,7 @@ def _pieces(layout: Layout, ground: Ground, place: FloatArray) -> Pieces:
 
 def _with_contour(pieces: Pieces, ground: Ground) -> Pieces:
     """Give rings back the vertices of the contour that straight runs of the rim have lost."""
-    lost = np.setdiff1d(np.arange(len(ground.rings.xy)), pieces.vertex)
+    lost = np.setdiff1d(ground.rings.place, pieces.vertex)
     rings = [r.tolist() for r in np.split(pieces.vertex, pieces.offsets[1:-1])]
     access = [a.tolist() for a in np.split(pieces.access, pieces.offsets[1:-1])]
     ring_block = pieces.block[pieces.face]

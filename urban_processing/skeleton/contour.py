@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from urban_processing.errors import TopologyError
 from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.touches import cycles, turns_at_touches
 
 STRAIGHT = 2.0**-20
 """Distance in metres within which vertices between two others are on one straight edge with
@@ -25,8 +25,8 @@ NO_RING = "A ring of a block has fewer than three corners: repair the block or l
 class Contour:
     """Merged edges of a polygon's rings, M in all, in coordinates that the result does not show.
 
-    Rings are taken from their lowest vertex on and in the order of these, so that nothing
-    depends on where a ring begins.
+    Rings are those that bound the land (`turns_at_touches`), taken from their lowest vertex on and
+    in the order of these, so that nothing depends on where a ring begins.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ class Contour:
         (M,) next and last merged edge in the ring.
     run
         (M,) vertices of each merged edge in the order of the caller, both ends included.
+    after
+        (N,) next vertex after each of the caller's, as `turns_at_touches` says.
     """
 
     origin: tuple[float, float]
@@ -56,6 +58,7 @@ class Contour:
     following: list[int]
     previous: list[int]
     run: list[list[int]]
+    after: list[int]
 
     def __len__(self) -> int:
         """Return the number of merged edges."""
@@ -86,31 +89,35 @@ def contour_of(xy: FloatArray, offsets: IntArray, straight: float) -> Contour:
     # the middle in whole metres, so that nothing is lost to the shift
     origin = np.floor((low + high) / 2)
     points = [(x, y) for x, y in (xy - origin).tolist()]
+    after = turns_at_touches(points, offsets.tolist())
+
+    def begin(k: int) -> tuple[tuple[float, float], tuple[float, float]]:
+        return points[k], points[after[k]]
+
     rings = []
-    for first, last in zip(offsets[:-1].tolist(), offsets[1:].tolist(), strict=True):
-        ring = list(range(first, last))
-        start = min(range(len(ring)), key=lambda k: points[ring[k]])
+    for ring in cycles(after):
+        start = min(range(len(ring)), key=lambda k: begin(ring[k]))
         rings.append(ring[start:] + ring[:start])
-    rings.sort(key=lambda ring: points[ring[0]])
-    twice = {place for place, count in Counter(points).items() if count > 1}
+    rings.sort(key=lambda ring: begin(ring[0]))
     runs: list[list[int]] = []
     following: list[int] = []
     for ring in rings:
-        new = _runs(points, ring, straight, twice)
-        begin = len(runs)
-        following += [*range(begin + 1, begin + len(new)), begin]
+        new = _runs(points, ring, straight)
+        first = len(runs)
+        following += [*range(first + 1, first + len(new)), first]
         runs += new
-    return _lines(points, runs, following, (float(origin[0]), float(origin[1])), high - low)
+    place = ((float(origin[0]), float(origin[1])), float((high - low).max()))
+    return _lines(points, runs, following, place, after)
 
 
 def _lines(
     points: list[tuple[float, float]],
     runs: list[list[int]],
     following: list[int],
-    origin: tuple[float, float],
-    extent: FloatArray,
+    place: tuple[tuple[float, float], float],
+    turns: list[int],
 ) -> Contour:
-    """Return the lines of runs of vertices."""
+    """Return the lines of runs of vertices; `place` is the origin and the extent."""
     previous = [0] * len(runs)
     for e, after in enumerate(following):
         previous[after] = e
@@ -124,30 +131,21 @@ def _lines(
         dy.append(uy)
         # the mean of both ends, so that a mirrored edge has the mirrored line
         c.append(((ux * y0 - uy * x0) + (ux * y1 - uy * x1)) / 2)
-    size = float(extent.max())
-    return Contour(origin, size, x, y, dx, dy, c, following, previous, runs)
+    origin, size = place
+    return Contour(origin, size, x, y, dx, dy, c, following, previous, runs, turns)
 
 
 def _runs(
     points: list[tuple[float, float]],
     ring: list[int],
     straight: float,
-    twice: set[tuple[float, float]],
 ) -> list[list[int]]:
     """Return the vertices of each merged edge of a ring, both ends included."""
     n = len(ring)
     at = [points[k] for k in ring]
     bend = [_bend(a, b, c) for a, b, c in zip(at[-1:] + at[:-1], at, at[1:] + at[:1], strict=True)]
-    # the wavefront is parted where rings touch
-    free = [place not in twice for place in at]
-    exact = [
-        abs(sine) <= EXACTLY_STRAIGHT and ahead and alone
-        for (sine, _, ahead), alone in zip(bend, free, strict=True)
-    ]
-    near = [
-        distance <= straight and ahead and alone
-        for (_, distance, ahead), alone in zip(bend, free, strict=True)
-    ]
+    exact = [abs(sine) <= EXACTLY_STRAIGHT and ahead for sine, _, ahead in bend]
+    near = [distance <= straight and ahead for _, distance, ahead in bend]
     corners = [k for k in range(n) if not near[k]]
     cut = []
     for a, b in zip(corners, [*corners[1:], *(k + n for k in corners[:1])], strict=True):

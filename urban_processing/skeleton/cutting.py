@@ -60,7 +60,7 @@ def cut_at_depth(
     height = np.append(skeleton.height[old], np.full(len(new), depth))
     patios = _patios(xy, [(number[b], number[a]) for a, b in cut.level])
     lower = tuple(np.array([number[k] for k in face]) for face in faces)
-    return Skeleton(xy, height, lower, skeleton.edge_face), patios
+    return Skeleton(xy, height, lower, skeleton.edge_face, skeleton.following), patios
 
 
 class _Cut:

@@ -20,12 +20,18 @@ class Skeleton:
         (V,) distance from the contour in metres; 0 on it.
     faces
         One for each merged edge, which is a run of collinear edges of one ring: a ring of
-        vertices, counter-clockwise, that begins with those of the run in order; none twice.
+        vertices, counter-clockwise, that begins with those of the run in order, the `following`
+        of the last one included; none twice.
     edge_face
         (N,) face of each edge.
+    following
+        (N,) next vertex of the contour after each. Where rings touch at a vertex, it is that of the
+        edge which bounds the same corner of the land, which may be of another ring: faces on both
+        sides of a touch have no vertex in common there.
     """
 
     xy: FloatArray
     height: FloatArray
     faces: tuple[IntArray, ...]
     edge_face: IntArray
+    following: IntArray

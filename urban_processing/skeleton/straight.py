@@ -6,8 +6,6 @@ the first row of parcels along it (Aichholzer et al. 1995; Vanegas 2012, section
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from urban_processing.errors import TopologyError
@@ -16,7 +14,6 @@ from urban_processing.site import FINE_GRID
 from urban_processing.skeleton.contour import STRAIGHT, Contour, contour_of
 from urban_processing.skeleton.cutting import cut_at_depth
 from urban_processing.skeleton.faces import (
-    SAME_PLACE,
     check_faces,
     contracted,
     refined,
@@ -35,10 +32,6 @@ SIMPLER = (STRAIGHT, 2.0**-18, 2.0**-12)
 """Distances in metres within which vertices are on one straight edge, in the order in which they
 are tried: only contours with edges too short for the grid of all coordinates need more than
 the first."""
-
-TOUCHING = 1e-12
-"""Height of nodes where rings touch, as a share of the extent of a polygon: they are there
-already, as vertices of the contour."""
 
 
 def straight_skeleton(xy: FloatArray, offsets: IntArray) -> Skeleton:
@@ -90,10 +83,6 @@ def _assembled(xy: FloatArray, contour: Contour, arcs: Arcs, group: list[int]) -
     m, n = len(contour), len(xy)
     arcs = refined(contour, arcs, group)
     rings = rings_of_faces(contour, arcs, group)
-    touching = TOUCHING * contour.size
-    touch = [k for k in range(m, len(arcs.t)) if arcs.t[k] <= touching]
-    if touch:
-        rings = [_without_touch(contour, arcs, ring, touch) for ring in rings]
     used = sorted({node for ring in rings for node in ring[2:] if node >= m})
     number = {node: n + k for k, node in enumerate(used)}
     inner = np.array([(arcs.x[k], arcs.y[k]) for k in used]).reshape(-1, 2) + contour.origin
@@ -107,14 +96,5 @@ def _assembled(xy: FloatArray, contour: Contour, arcs: Arcs, group: list[int]) -
     order = sorted(range(m), key=lambda e: min(contour.run[e][:-1]))
     for rank, e in enumerate(order):
         edge_face[contour.run[e][:-1]] = rank
-    return Skeleton(xy, height, tuple(np.array(faces[e]) for e in order), edge_face)
-
-
-def _without_touch(contour: Contour, arcs: Arcs, ring: list[int], touch: list[int]) -> list[int]:
-    """Return the ring of a face without nodes that are corners of its edge already."""
-    ends = [(contour.x[k], contour.y[k]) for k in ring[:2]]
-    near = SAME_PLACE
-    for k in touch:
-        if k in ring and all(math.dist(end, (arcs.x[k], arcs.y[k])) > near for end in ends):
-            raise Unresolved
-    return [k for k in ring if k not in touch]
+    rings_of_edges = tuple(np.array(faces[e]) for e in order)
+    return Skeleton(xy, height, rings_of_edges, edge_face, np.array(contour.after))

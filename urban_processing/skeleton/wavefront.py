@@ -261,7 +261,7 @@ class _Wavefront:
         heads = [v for v in here if self.prev[v] not in here]
         if len(here) < 2 and len(heads) + len(hit) < 2:
             return False
-        if len(heads) == len(here) and not hit and len({self.node[v] for v in here}) == 1:
+        if len(heads) == len(here) and not hit and len({self._start(v) for v in here}) == 1:
             return False  # they part here
         node = len(self.arcs.x)
         self.arcs.x.append(x)
@@ -285,6 +285,11 @@ class _Wavefront:
             if self.prev[v] not in new:
                 self._await_collapse(self.prev[v], t)
         return True
+
+    def _start(self, v: int) -> tuple[float, float]:
+        """Return where a vertex started from."""
+        node = self.node[v]
+        return self.arcs.x[node], self.arcs.y[node]
 
     def _gather(self, x: float, y: float, t: float) -> tuple[dict[int, None], list[int]]:
         """Return vertices at a place, and those before pieces that pass through it."""

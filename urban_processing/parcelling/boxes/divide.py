@@ -9,6 +9,7 @@ import numpy as np
 from urban_processing.access_rule import MEASURED_M, reached_frontage
 from urban_processing.hashing import splitmix64, uniform
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.touches import cycles
 from urban_processing.parcelling.boxes.candidates import Contour, Faces
 from urban_processing.parcelling.boxes.cut_tree import (
     Level,
@@ -120,14 +121,20 @@ def _contour_of(ground: Ground) -> Contour:
     length = np.sqrt((edge**2).sum(axis=1))
     bends = np.abs(sine) > STRAIGHT * length * length[previous]
     bends |= (before * edge).sum(axis=1) < 0
+    shared = rings.place[rings.place != np.arange(len(bends))]
+    bends[shared] = True
     return Contour(np.append(bends, False), np.append(ground.access, False))
 
 
 def _first_level(ground: Ground) -> Level:
-    n = len(ground.rings.xy)
-    rings = Rings(np.arange(n), np.arange(n), ground.rings.offsets, ground.rings.block)
-    block = np.arange(len(ground))
-    return Level(rings, block, ground.lineage, block)
+    """Return the polygons; rings that touch are one, so that no cut need open a hole there."""
+    given, block = ground.rings, np.arange(len(ground))
+    edge, offsets, face = np.arange(len(given.xy)), given.offsets, given.block
+    if (given.place != edge).any():
+        rings = cycles(given.along_land.tolist())
+        edge, offsets = np.concatenate(rings), starts(np.array([len(ring) for ring in rings]))
+        face = given.edge_block[edge[offsets[:-1]]]
+    return Level(Rings(given.place[edge], edge, offsets, face), block, ground.lineage, block)
 
 
 def _edge_segments(ground: Ground) -> Segments:
@@ -247,7 +254,7 @@ def _as_pieces(ground: Ground, contour: Contour, plane: _Plane, tree: Tree) -> P
         if not broken.any():
             break
         tree = taken_back(tree, depth[broken], face[broken])
-    noded = _from_lowest(noded, plane.xy)
+    noded = _from_lowest(noded.parted(plane.xy), plane.xy)
     xy, vertex = _used_vertices(plane.xy, noded.vertex, n_ground)
     first = starts(np.array([len(level.block) for level in tree.levels]))
     at = first[depth] + face

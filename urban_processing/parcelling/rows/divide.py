@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -141,7 +142,8 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     skeleton, patios = rows_and_patios(
         skeleton, offset=float(rules.offset[k]), area=area, bounds=bounds
     )
-    sheet = Sheet(skeleton.xy, skeleton.height, polygon.following)
+    following = skeleton.following.tolist()
+    sheet = Sheet(skeleton.xy, skeleton.height, following, place=polygon.place)
     needs = Needs(
         area=bounds.min_area,
         depth=bounds.min_area / bounds.max_width,
@@ -173,6 +175,7 @@ def _divide(polygon: Polygon, rules: Rules, k: int, *, seed: int, wary: bool = F
     ]
     faces += patio_faces(sheet, patios, child(polygon.lineage, _PATIOS))
     straightened(sheet, faces)
+    faces = [replace(face, rings=sheet.parted(face.rings)) for face in faces]
     return Divided(polygon, sheet, faces)
 
 
@@ -192,8 +195,7 @@ def _alpha_strips(
         key=lambda s: (
             s.street.rim,
             -round(s.street.length, 4),
-            round(sheet.y[s.front[0]], 4),
-            round(sheet.x[s.front[0]], 4),
+            *((round(sheet.y[v], 4), round(sheet.x[v], 4)) for v in s.front[:2]),
         )
     )
     for rank, strip in enumerate(strips):

@@ -30,6 +30,8 @@ class Polygon:
         (N, 2) vertices.
     offsets
         (R + 1,) where rings begin.
+    place
+        First vertex at the place of each: more than one is there where rings touch.
     access, width, street
         (N,) what is known of each edge, as in `Ground`.
     lineage
@@ -40,6 +42,7 @@ class Polygon:
     shift: FloatArray
     xy: FloatArray
     offsets: IntArray
+    place: list[int]
     access: list[bool]
     width: list[float]
     street: list[int]
@@ -56,7 +59,11 @@ class Polygon:
 
 @dataclass(frozen=True)
 class Face:
-    """A piece of a polygon: its rings of vertices, the shell first, and what `Pieces` says."""
+    """A piece of a polygon: its rings of vertices, the shell first, and what `Pieces` says.
+
+    A vertex of the contour that begins an edge of a ring is that which begins the edge of the
+    contour, also where others are at the same place.
+    """
 
     rings: list[list[int]]
     lineage: int
@@ -87,6 +94,7 @@ def polygons_of(ground: Ground) -> Iterator[Polygon]:
             shift=shift,
             xy=xy - shift,
             offsets=offsets - first,
+            place=(rings.place[first:stop] - first).tolist(),
             access=ground.access[first:stop].tolist(),
             width=ground.width[first:stop].tolist(),
             street=ground.street[first:stop].tolist(),
@@ -96,7 +104,8 @@ def polygons_of(ground: Ground) -> Iterator[Polygon]:
 
 def whole(polygon: Polygon) -> Divided:
     """Return a polygon as one face."""
-    sheet = Sheet(polygon.xy, np.zeros(len(polygon.xy)), polygon.following)
+    height = np.zeros(len(polygon.xy))
+    sheet = Sheet(polygon.xy, height, polygon.following, place=polygon.place)
     rings = [list(range(a, b)) for a, b in pairwise(polygon.offsets.tolist())]
     return Divided(polygon, sheet, [Face(rings, polygon.lineage, 0)])
 
@@ -137,7 +146,7 @@ def assembled(ground: Ground, parts: Sequence[Divided]) -> Pieces:
         n = sheet.n_contour
         used = sorted({v for f in part.faces for ring in f.rings for v in ring if v >= n})
         number = dict(zip(used, range(count, count + len(used)), strict=True))
-        number.update(zip(range(n), range(polygon.first, polygon.first + n), strict=True))
+        number.update((k, polygon.first + place) for k, place in enumerate(polygon.place))
         count += len(used)
         if used:
             xy = np.array([(sheet.x[v], sheet.y[v]) for v in used])

@@ -10,6 +10,7 @@ from itertools import pairwise
 import shapely
 
 from urban_processing.mesh.planar import FloatArray
+from urban_processing.mesh.touches import loops_of
 from urban_processing.site import FINE_GRID
 
 SAME = 0.05
@@ -28,11 +29,22 @@ class Sheet:
     height
         (V,) distance of each from the contour.
     following
-        Next vertex of the contour after each of its vertices.
+        Next vertex of the contour after each of its vertices, as in `Skeleton`: where its rings
+        touch, each corner of the land has a vertex of its own.
+    place
+        First vertex at the place of each vertex of the contour; by default each is alone.
     """
 
-    def __init__(self, xy: FloatArray, height: FloatArray, following: Sequence[int]) -> None:
+    def __init__(
+        self,
+        xy: FloatArray,
+        height: FloatArray,
+        following: Sequence[int],
+        *,
+        place: Sequence[int] | None = None,
+    ) -> None:
         n_contour = len(following)
+        place = range(n_contour) if place is None else place
         self.x: list[float] = xy[:n_contour, 0].tolist()
         self.y: list[float] = xy[:n_contour, 1].tolist()
         self.x += [to_grid(value) for value in xy[n_contour:, 0].tolist()]
@@ -40,6 +52,9 @@ class Sheet:
         self.height: list[float] = height.tolist()
         self.n_contour = n_contour
         self.following = following
+        self.place = [*place, *range(n_contour, len(xy))]
+        self.touches = len(set(place)) < n_contour
+        """Whether rings of the contour touch."""
         self.contour_edge: dict[int, int] = {}
         """Vertices added on the contour, and the vertex that begins their edge."""
         self._points: dict[tuple[int, int], list[tuple[float, int]]] = {}
@@ -49,6 +64,7 @@ class Sheet:
         self.x.append(to_grid(x))
         self.y.append(to_grid(y))
         self.height.append(height)
+        self.place.append(len(self.place))
         return len(self.x) - 1
 
     def add_between(self, u: int, v: int, share: float) -> int:
@@ -72,7 +88,7 @@ class Sheet:
         """Return the edge of the contour that an edge of a ring is part of; -1 if of none."""
         edge = self.edge_of(u)
         if edge < self.n_contour and (
-            self.contour_edge.get(v) == edge or self.following[edge] == v
+            self.contour_edge.get(v) == edge or self.place[self.following[edge]] == self.place[v]
         ):
             return edge
         return -1
@@ -122,10 +138,10 @@ class Sheet:
 
     def contains(self, shell: Sequence[int], ring: Sequence[int]) -> bool:
         """Whether a ring lies within another that it does not cross."""
-        x, y = self.x, self.y
-        own = set(shell)
+        x, y, place = self.x, self.y, self.place
+        own = {place[v] for v in shell}
         spots = [((x[u] + x[v]) / 2, (y[u] + y[v]) / 2) for u, v in pairwise(ring)]
-        spots = [(x[v], y[v]) for v in ring if v not in own] + spots
+        spots = [(x[v], y[v]) for v in ring if place[v] not in own] + spots
         px, py = spots[0]
         inside = False
         u = shell[-1]
@@ -150,8 +166,19 @@ class Sheet:
 
     def is_sound(self, rings: Sequence[Sequence[int]]) -> bool:
         """Whether rings, the shell first, make a valid polygon."""
-        shell, *holes = ([(self.x[v], self.y[v]) for v in ring] for ring in rings)
+        shell, *holes = ([(self.x[v], self.y[v]) for v in ring] for ring in self.parted(rings))
         return bool(shapely.is_valid(shapely.Polygon(shell, holes)))
+
+    def parted(self, rings: Sequence[Sequence[int]]) -> list[list[int]]:
+        """Take the rings of a face apart where they come to a place again; the shell first.
+
+        A ring that goes around a hole of the contour which touches another of its rings does so.
+        """
+        if not self.touches:
+            return [list(ring) for ring in rings]
+        loops = [loop for ring in rings for loop in loops_of(ring, self.place)]
+        shell = max(range(len(loops)), key=lambda k: self.area(loops[k]))
+        return [loops[shell], *loops[:shell], *loops[shell + 1 :]]
 
     def area(self, ring: Sequence[int]) -> float:
         """Signed area of a ring."""

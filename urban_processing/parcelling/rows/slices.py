@@ -9,6 +9,7 @@ from functools import partial
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
+from urban_processing.mesh.touches import loops_of
 from urban_processing.parcelling.rows.bays import Bay, Hit, bays_of
 from urban_processing.parcelling.rows.sheet import Sheet
 from urban_processing.parcelling.rows.sight import sees
@@ -271,7 +272,8 @@ def rings_of_lots(sheet: Sheet, strip: Strip, lots: list[Lot]) -> list[list[list
     rings = (
         lot.front + [v for _, v in spots[place[lot.begin] : place[lot.end] + 1]] for lot in lots
     )
-    return [_polygons(sheet, _loops(ring)) for ring in rings]
+    own = range(len(sheet.x))
+    return [_polygons(sheet, loops_of(ring, own)) for ring in rings]
 
 
 def _polygons(sheet: Sheet, loops: list[list[int]]) -> list[list[list[int]]]:
@@ -283,25 +285,6 @@ def _polygons(sheet: Sheet, loops: list[list[int]]) -> list[list[list[int]]]:
             around = [p for p in polygons if sheet.contains(p[0], loop)]
             min(around or polygons, key=lambda p: sheet.area(p[0])).append(loop)
     return polygons
-
-
-def _loops(ring: list[int]) -> list[list[int]]:
-    """Take a ring apart where it touches itself; arcs walked to and fro fall away."""
-    loops = []
-    chain: list[int] = []
-    at: dict[int, int] = {}
-    for v in [*ring, ring[0]]:
-        if v in at:
-            start = at[v]
-            loop = chain[start:]
-            del chain[start:]
-            for u in loop:
-                del at[u]
-            if len(loop) > 2:
-                loops.append(loop)
-        at[v] = len(chain)
-        chain.append(v)
-    return loops
 
 
 def _start(bay: Bay) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from urban_processing.mesh.touches import cycles
 from urban_processing.parcelling.rows.divided import Polygon
 from urban_processing.parcelling.rows.sheet import Sheet
 
@@ -89,12 +90,11 @@ class Street:
 
 
 def sides_of_rings(sheet: Sheet, polygon: Polygon, edge_face: Sequence[int]) -> list[list[Side]]:
-    """Return the sides of each ring of a polygon, given the face of the skeleton on each edge."""
+    """Return the sides of each ring of the contour, given the face of the skeleton on each edge."""
     rings = []
-    for low, high in pairwise(polygon.offsets.tolist()):
-        starts = [
-            k for k in range(low, high) if edge_face[k] != edge_face[k - 1 if k > low else high - 1]
-        ]
+    for ring in cycles(sheet.following):
+        before = ring[-1:] + ring[:-1]
+        starts = [k for u, k in zip(before, ring, strict=True) if edge_face[k] != edge_face[u]]
         stops = starts[1:] + starts[:1]
         rings.append(
             [
@@ -291,5 +291,7 @@ def _furthest(ring: Sequence[Side], center: tuple[float, float]) -> int:
             -round(math.hypot(ring[k].x - cx, ring[k].y - cy), 6),
             round(ring[k].y, 6),
             round(ring[k].x, 6),
+            round(ring[k].dy, 6),  # rings may touch there
+            round(ring[k].dx, 6),
         ),
     )
