@@ -1,4 +1,4 @@
-"""Which pieces of parcel boundaries are on streets, and which parcels lie beside each other."""
+"""Which pieces of parcel boundaries are on streets."""
 
 from __future__ import annotations
 
@@ -8,19 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.blocks.edges import ALIGNED_DEG
-from urban_processing.blocks.model import BlockRings
+from urban_processing.fabric.touching import PARCEL_GAP, Touching, runs_along
 from urban_processing.mesh.overlap import Overlaps, Segments, find_overlaps
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
 from urban_processing.site import GRID
 
 Geometries = npt.NDArray[np.object_]
-
-PARCEL_GAP = 0.5
-"""Parcels no further apart than so many metres touch."""
-
-LEAST_SHARED = 0.5
-"""Neighbours touch along more than so many metres."""
 
 ALONG_DEG = 50.0
 """A boundary on a street makes at most this angle with its centreline: cut-off corners of 45°
@@ -28,6 +21,12 @@ are on one of their streets."""
 
 ROUNDED_DIGITS = 3
 """Streets as far away, to this many digits of a metre, are as near."""
+
+SIGHT_STEP = 4.0
+"""Whether a parcel stands before another is looked at every so many metres."""
+
+_ROUNDING = 1e-9
+"""Shares that are nearer are one."""
 
 _CLEARANCE = 0.05
 """Lines of sight begin so many metres off the boundary."""
@@ -84,74 +83,6 @@ class StreetPieces:
         return StreetPieces(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
-@dataclass(frozen=True, eq=False)
-class Touching:
-    """Pieces of boundary edges, from share `low` to `high`, along which another parcel lies."""
-
-    edge: IntArray
-    other: IntArray
-    low: FloatArray
-    high: FloatArray
-
-
-def boundary_segments(rings: BlockRings) -> Segments:
-    """(N,) the edges of the rings of parcels; the parcel is on their left."""
-    return Segments(rings.xy, rings.xy[rings.following], rings.edge_block)
-
-
-def touching_parcels(boundary: Segments) -> Touching:
-    """Where parcels touch, but for gaps of `PARCEL_GAP`."""
-    found = find_overlaps(boundary, boundary, PARCEL_GAP, clipped=True, least=GRID)
-    owner, other = boundary.line[found.first], boundary.line[found.second]
-    kept = (owner != other) & (found.angle <= ALIGNED_DEG)
-    found = found.take(kept)
-    return Touching(found.first, other[kept], found.low, found.high)
-
-
-def count_neighbours(
-    touching: Touching, boundary: Segments, on_street: StreetPieces, n: int
-) -> IntArray:
-    """(n,) number of parcels that each shares a line of its boundary with.
-
-    They touch along more than `LEAST_SHARED` metres that are on no centreline.
-    """
-    on = on_street.on_centreline
-    kept = _outside(
-        touching.edge, touching.low, touching.high,
-        on_street.edge[on], on_street.low[on], on_street.high[on],
-    )  # fmt: skip
-    owner = boundary.line[touching.edge]
-    pair = owner * np.int64(n) + touching.other
-    found, index = np.unique(pair, return_inverse=True)
-    length = np.bincount(
-        index.ravel(), weights=kept * boundary.length[touching.edge], minlength=len(found)
-    )
-    long = found[np.round(length, 6) > LEAST_SHARED]
-    both = np.unique(np.concatenate([long, (long % n) * n + long // n]))
-    return np.bincount(both // n, minlength=n)
-
-
-def _outside(
-    edge: IntArray, low: FloatArray, high: FloatArray,
-    other_edge: IntArray, other_low: FloatArray, other_high: FloatArray,
-) -> FloatArray:  # fmt: skip
-    """Share of each stretch that no other stretch of the same edge, none of which meet, covers."""
-    order = np.lexsort((other_low, other_edge))
-    at = 2.0 * other_edge[order]
-    starts, ends = at + other_low[order], at + other_high[order]
-    covered = np.append(0.0, np.cumsum(ends - starts))
-
-    def before(place: FloatArray) -> FloatArray:
-        if not len(starts):
-            return np.zeros(len(place))
-        k = np.searchsorted(starts, place, side="right")
-        over = np.where(k > 0, np.maximum(ends[np.maximum(k - 1, 0)] - place, 0.0), 0.0)
-        return covered[k] - over
-
-    base = 2.0 * edge
-    return np.asarray((high - low) - (before(base + high) - before(base + low)))
-
-
 def pieces_on_streets(
     boundary: Segments,
     parcels: Geometries,
@@ -183,7 +114,7 @@ def pieces_on_streets(
         Metres.
     """
     along = find_overlaps(boundary, streets.segments, snap, clipped=True, least=GRID)
-    along = along.take(along.angle <= ALIGNED_DEG)
+    along = along.take(runs_along(along, boundary))
     free = _free(boundary, touching)
     beside = find_overlaps(
         boundary, streets.segments, streets.width / 2 + reach, clipped=True, least=GRID
@@ -279,7 +210,7 @@ def _around_ends(
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
-    """Stretches of edges over which the candidates are the same."""
+    """Stretches of edges over which the candidates are the same, free ones in short steps."""
 
     edge: IntArray
     low: FloatArray
@@ -297,7 +228,13 @@ def _cells(boundary: Segments, candidates: _Candidates, free: _Free) -> _Cells:
     middle = 2.0 * edge[cell] + (at[cell] + at[cell + 1]) / 2
     k = np.searchsorted(2.0 * free.edge + free.low, middle, side="right") - 1
     ends = np.append(2.0 * free.edge + free.high, -1.0)
-    return _Cells(edge[cell], at[cell], at[cell + 1], (k >= 0) & (middle <= ends[k]))
+    is_free = (k >= 0) & (middle <= ends[k])
+    steps = np.where(is_free, np.ceil(length[cell] / SIGHT_STEP), 1.0).astype(np.int64)
+    of = np.repeat(np.arange(len(cell)), steps)
+    step = np.arange(len(of)) - np.repeat(np.cumsum(steps) - steps, steps)
+    low, size = at[cell][of], (at[cell + 1] - at[cell])[of]
+    begin, end = low + size * (step / steps[of]), low + size * ((step + 1) / steps[of])
+    return _Cells(edge[cell][of], begin, end, is_free[of])
 
 
 def _nearest(
@@ -363,7 +300,7 @@ def _merged(pieces: StreetPieces) -> StreetPieces:
         (pieces.edge[1:] != pieces.edge[:-1])
         | (pieces.segment[1:] != pieces.segment[:-1])
         | (pieces.on_centreline[1:] != pieces.on_centreline[:-1])
-        | (pieces.low[1:] > pieces.high[:-1])
+        | (pieces.low[1:] > pieces.high[:-1] + _ROUNDING)
     )
     first = np.flatnonzero(new)
     size = pieces.high - pieces.low

@@ -3,40 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.centrelines import clean_centrelines
-from urban_processing.blocks.model import BlockRings, rings_of
 from urban_processing.blocks.noding import NODE_GRID, Centrelines
 from urban_processing.blocks.streets import StreetLines, chosen_streets, street_lines
 from urban_processing.errors import BoundaryError
-from urban_processing.fabric.frontage import (
-    StreetPieces,
-    StreetSegments,
-    boundary_segments,
-    count_neighbours,
-    pieces_on_streets,
-    touching_parcels,
-)
+from urban_processing.fabric.described import describe_parcels
 from urban_processing.fabric.land_use import StreetLand, gross_street_land, net_street_land
 from urban_processing.fabric.model import (
-    NO_BLOCK,
-    UNKNOWN_LEVEL,
     Fabric,
     FabricBlocks,
     FabricParcels,
-    Fronts,
-    ParcelRings,
 )
 from urban_processing.fabric.observed import ObservedParcels, street_parcels
 from urban_processing.fabric.outline import town_outline
-from urban_processing.fabric.streets_in_land import INNER, StreetsInLand, streets_in_land
-from urban_processing.mesh.overlap import Segments, find_overlaps, segments_of
-from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.fabric.streets_in_land import StreetsInLand, streets_in_land
 from urban_processing.params.measure import MeasureParams
 from urban_processing.site import Frame, Issue
 from urban_processing.streets.classes import NodeKind
@@ -48,9 +34,6 @@ INSIDE_SHARE = 0.5
 
 OVERLAP_SHARE = 1e-3
 """Parcels that overlap by more than this share of their area are told of."""
-
-RIM_LENGTH = 0.5
-"""Parcels lie on the rim if more than so many metres of their boundary do."""
 
 
 def fabric_of_layers(
@@ -291,141 +274,32 @@ class _Reading:
         self, parcels: ObservedParcels, ground: StreetsInLand, roads: Geometries
     ) -> tuple[FabricParcels, StreetLand | None]:
         """The parcels with what streets and neighbours make of them, and the land of streets."""
-        polygons, rings = parcels.polygons, rings_of(parcels.polygons)
-        n = len(polygons)
-        boundary = boundary_segments(rings)
-        touching = touching_parcels(boundary)
-        pieces = pieces_on_streets(
-            boundary,
-            polygons,
-            _street_segments(ground),
-            touching,
-            snap=max(self.params.snap_tolerance, NODE_GRID),
-            reach=self.params.street_reach,
+        known, gross = describe_parcels(
+            parcels, ground, self.params, streets_known=self.streets is not None
         )
-        block = _blocks_of(polygons, ground)
-        taken = None
-        if self.streets is not None:
-            taken = self._street_land(ground, polygons, roads, pieces, boundary, block)
-        known = FabricParcels(
-            rings=_parcel_rings(polygons, rings, pieces, ground, boundary, self.streets is None),
-            parcel_id=parcels.parcel_id,
-            part=_most_overlapped(polygons, ground.land, 0),
-            block=block,
-            level=np.full(n, UNKNOWN_LEVEL),
-            land_use=parcels.land_use,
-            net_area=shapely.area(polygons) if taken is None else taken.net_area,
-            neighbours=count_neighbours(touching, boundary, pieces, n),
-            fronts=_fronts(pieces, boundary, ground),
-        )
-        self._tell_of_parcels(known)
-        return known, taken
+        self._tell_of_overlaps(known)
+        if self.streets is None:
+            return known, None
+        if gross:
+            message = (
+                "Parcels run to the centreline of streets: their net areas are less the nominal "
+                "widths of these."
+            )
+            self.issues.append(Issue("gross_parcels", message))
+            taken = gross_street_land(ground, parcels.polygons, known.block)
+        else:
+            taken = net_street_land(
+                ground,
+                self._union(parcels.polygons),
+                known.rings.area,
+                roads,
+                reach=self.params.street_reach,
+            )
+        return replace(known, net_area=taken.net_area), taken
 
-    def _street_land(
-        self,
-        ground: StreetsInLand,
-        polygons: Geometries,
-        roads: Geometries,
-        pieces: StreetPieces,
-        boundary: Segments,
-        block: IntArray,
-    ) -> StreetLand:
-        """The land of streets, by whether parcels run to the centreline."""
-        length = (pieces.high - pieces.low) * boundary.length[pieces.edge]
-        if length[pieces.on_centreline].sum() <= length.sum() / 2:
-            body = self._union(polygons)
-            reach = self.params.street_reach
-            return net_street_land(ground, body, shapely.area(polygons), roads, reach=reach)
-        message = (
-            "Parcels run to the centreline of streets: their net areas are less the nominal "
-            "widths of these."
-        )
-        self.issues.append(Issue("gross_parcels", message))
-        return gross_street_land(ground, polygons, block)
-
-    def _tell_of_parcels(self, parcels: FabricParcels) -> None:
+    def _tell_of_overlaps(self, parcels: FabricParcels) -> None:
         total = float(parcels.rings.area.sum())
         twice = total - float(shapely.area(self._union(parcels.rings.polygons)))
         if twice > OVERLAP_SHARE * total:
             message = f"Parcels overlap: {twice:.0f} m² of them are there twice or more."
             self.issues.append(Issue("parcels_overlap", message, value=twice))
-
-
-def _street_segments(ground: StreetsInLand) -> StreetSegments:
-    net = ground.network
-    ends = np.flatnonzero(net.node_kind == NodeKind.END)
-    first, last = net.half_edges[net.offsets[:-1]] >> 1, net.half_edges[net.offsets[1:] - 1] >> 1
-    node = np.concatenate([net.start, net.end])
-    at = np.flatnonzero(np.isin(node, ends))
-    return StreetSegments(
-        ground.lines.segments,
-        ground.width,
-        ground.lines.xy[net.node_vertex[node[at]]],
-        np.concatenate([first, last])[at],
-    )
-
-
-def _blocks_of(polygons: Geometries, ground: StreetsInLand) -> IntArray:
-    if not ground.network.n_edges:
-        return np.full(len(polygons), NO_BLOCK)
-    return _most_overlapped(polygons, ground.faces.polygons, NO_BLOCK)
-
-
-def _most_overlapped(polygons: Geometries, areas: Geometries, none: int) -> IntArray:
-    """(n,) the area that has most of each polygon, `none` where none has any."""
-    out = np.full(len(polygons), none)
-    area, polygon = shapely.STRtree(polygons).query(areas, predicate="contains")
-    out[polygon] = area
-    rows = np.setdiff1d(np.arange(len(polygons)), polygon)
-    row, area = shapely.STRtree(areas).query(polygons[rows], predicate="intersects")
-    shared = np.round(shapely.area(shapely.intersection(polygons[rows[row]], areas[area])), 3)
-    order = np.lexsort((area, -shared, row))
-    order = order[shared[order] > 0]
-    found, first = np.unique(row[order], return_index=True)
-    out[rows[found]] = area[order[first]]
-    return out
-
-
-def _parcel_rings(
-    polygons: Geometries,
-    rings: BlockRings,
-    pieces: StreetPieces,
-    ground: StreetsInLand,
-    boundary: Segments,
-    unknown: bool,
-) -> ParcelRings:
-    """The shapes of parcels, and what of them is on streets; NaN where that is `unknown`."""
-    n = len(polygons)
-    length = (pieces.high - pieces.low) * boundary.length[pieces.edge]
-    on_street = np.bincount(pieces.edge, weights=length, minlength=len(boundary.line))
-    frontage = np.bincount(boundary.line, weights=on_street, minlength=n)
-    shell = rings.is_shell[rings.edge_ring]
-    size = np.diff(rings.offsets)[rings.is_shell]
-    rim = np.zeros(n, dtype=bool)
-    rim[boundary.line[pieces.edge[ground.lines.rim[pieces.segment] != INNER]]] = True
-    return ParcelRings(
-        xy=rings.xy[shell],
-        offsets=np.append(0, np.cumsum(size)),
-        on_street=np.asarray(on_street[shell], dtype=np.float64),
-        frontage=np.full(n, np.nan) if unknown else np.asarray(frontage, dtype=np.float64),
-        polygons=polygons,
-        area=shapely.area(polygons),
-        rim=rim | _on_rim(boundary, ground.land, n),
-    )
-
-
-def _on_rim(boundary: Segments, land: Geometries, n: int) -> BoolArray:
-    """(n,) parcels with an edge on the rim of the land or on a hole of it."""
-    found = find_overlaps(boundary, segments_of(land), RIM_LENGTH, clipped=True, least=0.0)
-    length = (found.high - found.low) * boundary.length[found.first]
-    along = np.bincount(boundary.line[found.first], weights=length, minlength=n)
-    return np.asarray(along > RIM_LENGTH)
-
-
-def _fronts(pieces: StreetPieces, boundary: Segments, ground: StreetsInLand) -> Fronts:
-    parcel = boundary.line[pieces.edge]
-    edge = ground.edge_of[pieces.segment]
-    at: FloatArray = ground.along(pieces.segment, pieces.share)
-    length = (pieces.high - pieces.low) * boundary.length[pieces.edge]
-    order = np.lexsort((np.round(at, 6), edge, parcel))
-    return Fronts(parcel[order], edge[order], at[order], length[order])

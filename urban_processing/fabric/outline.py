@@ -6,8 +6,12 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.blocks.noding import Centrelines
+from urban_processing.blocks.model import rings_of
+from urban_processing.blocks.noding import NODE_GRID, Centrelines
+from urban_processing.fabric.frontage import StreetSegments, pieces_on_streets
+from urban_processing.fabric.touching import Touching, boundary_segments
 from urban_processing.mesh.build import canonical_rings
+from urban_processing.mesh.overlap import segments_of
 from urban_processing.mesh.places import line_segments
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.site import GRID
@@ -16,6 +20,10 @@ Geometries = npt.NDArray[np.object_]
 
 MITRE_LIMIT = 3.0
 """Corners stay corners where gaps are closed, up to so many times the distance."""
+
+WEDGE = 1.5
+"""Corners between streets around parcels are no further away than so many times the reach: the
+diagonal of a square, and a little more."""
 
 TOUCHES = 1e-3
 """Share of its outline along which a piece of land without parcels lies at the open."""
@@ -58,35 +66,66 @@ def town_outline(
     lines, half = lines[near], half[near]
     if not len(lines):
         return _sorted(_closed(body, reach))
-    widest = float(half.max())
-    strips = shapely.union_all(shapely.buffer(lines, half, cap_style="flat"))
-    # the coarse outline alone says which streets lie beside parcels
-    core = _closed(body, reach + widest)
-    beside = shapely.intersection(strips, shapely.buffer(core, reach + widest, quad_segs=4))
-    hull = _closed(shapely.union_all([core, beside]), reach)
-    rims = [shapely.boundary(hull), shapely.boundary(core)]
+    beside = half + reach
+    core = _closed(body, float(beside.max()))
+    strips = _strips(core, lines, half, reach)
+    rims = shapely.boundary(np.append(strips, core))
     edges = shapely.union_all(np.append(lines, rims), grid_size=GRID)
     cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(edges)))
-    kept = _belongs(cells, parcels, core, hull)
+    kept = _belongs(cells, parcels, core, strips, float(beside.max()))
     return _sorted(_filled(shapely.union_all(cells[kept]), lines, reach))
 
 
+def _strips(
+    core: shapely.Geometry, lines: Geometries, half: FloatArray, reach: float
+) -> Geometries:
+    """What lies between the outline of parcels and the streets along it, piece by piece."""
+    polygons = canonical_rings(shapely.get_parts(core))
+    outline = boundary_segments(rings_of(polygons))
+    streets = segments_of(lines)
+    nowhere = np.empty(0, dtype=np.int64)
+    pieces = pieces_on_streets(
+        outline,
+        polygons,
+        StreetSegments(streets, 2 * half[streets.line], np.empty((0, 2)), nowhere),
+        Touching(nowhere, np.empty(0), np.empty(0), nowhere),
+        snap=GRID,
+        reach=reach,
+    )
+    a, b = outline.start[pieces.edge], outline.end[pieces.edge]
+    c, d = streets.start[pieces.segment], streets.end[pieces.segment]
+    ends, feet = [], []
+    for share in (pieces.low, pieces.high):
+        place = a + share[:, None] * (b - a)
+        along = ((place - c) * (d - c)).sum(axis=1) / ((d - c) ** 2).sum(axis=1)
+        ends.append(place)
+        feet.append(c + np.clip(along, 0.0, 1.0)[:, None] * (d - c))
+    corners = np.stack([*ends, *feet], axis=1)
+    strips = shapely.convex_hull(shapely.multipoints(corners))
+    return np.asarray(strips[shapely.area(strips) > GRID], dtype=object)
+
+
 def _belongs(
-    cells: Geometries, parcels: Geometries, core: shapely.Geometry, hull: shapely.Geometry
+    cells: Geometries,
+    parcels: Geometries,
+    core: shapely.Geometry,
+    strips: Geometries,
+    near: float,
 ) -> npt.NDArray[np.bool_]:
-    """(C,) which pieces have parcels, or lie between what has: not at the open."""
+    """(C,) which pieces have parcels, or lie between parcels or between these and streets."""
     inside = shapely.point_on_surface(cells)
-    settled = np.zeros(len(cells), dtype=bool)
+    kept = np.zeros(len(cells), dtype=bool)
     _, cell = shapely.STRtree(cells).query(
         shapely.point_on_surface(parcels), predicate="intersects"
     )
-    settled[cell] = True
+    kept[cell] = True
+    cell, _ = shapely.STRtree(strips).query(inside, predicate="intersects")
+    kept[cell] = True
     in_core = shapely.intersects(_prepared(core), inside)
-    in_hull = shapely.intersects(_prepared(hull), inside)
-    at_open = _shared(cells, shapely.boundary(hull))
-    at_core = _shared(cells, shapely.boundary(core))
-    enclosed = at_open < TOUCHES * shapely.length(cells)
-    return np.asarray(settled | (in_hull & np.where(in_core, enclosed, at_core > at_open)))
+    enclosed = _shared(cells, shapely.boundary(core)) < TOUCHES * shapely.length(cells)
+    # at corners, between two strips and the streets
+    wedge = shapely.contains(_prepared(shapely.buffer(core, WEDGE * near, quad_segs=4)), cells)
+    return np.asarray(kept | np.where(in_core, enclosed, wedge))
 
 
 def _filled(land: shapely.Geometry, lines: Geometries, reach: float) -> shapely.Geometry:
@@ -130,8 +169,14 @@ def _prepared(geometry: shapely.Geometry) -> shapely.Geometry:
 
 
 def _sorted(land: shapely.Geometry) -> tuple[shapely.Polygon, ...]:
-    """Polygons on the grid, the largest first, with canonical rings."""
-    snapped = shapely.set_precision(land, GRID)
+    """Polygons on the grid, the largest first, with canonical rings.
+
+    Spikes, clefts and holes as thin as rounding go, and vertices on straight edges.
+    """
+    smooth = land
+    for distance in (2 * NODE_GRID, -4 * NODE_GRID, 2 * NODE_GRID):
+        smooth = shapely.buffer(smooth, distance, join_style="mitre", mitre_limit=MITRE_LIMIT)
+    snapped = shapely.set_precision(shapely.simplify(smooth, 2 * NODE_GRID), GRID)
     parts = shapely.get_parts(snapped)
     polygons = canonical_rings(parts[shapely.get_dimensions(parts) == 2])
     return tuple(sorted(polygons.tolist(), key=lambda p: (-round(p.area, 3), p.bounds, p.wkb)))

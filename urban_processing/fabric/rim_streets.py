@@ -259,7 +259,7 @@ def _cut_rim(
         corners = before[rows]
         whole = float(length[rows].sum())
         own = np.array([run[1:] for run in runs if run[0] == r]).reshape(-1, 2)
-        cuts = own[(own > 0) & (own < whole)]
+        cuts = own[(own > NODE_GRID) & (own < whole - NODE_GRID)]
         at, first = np.unique(np.round(np.append(corners, cuts), 6), return_index=True)
         edge = np.searchsorted(corners, np.append(corners, cuts)[first], side="right") - 1
         off = np.append(corners, cuts)[first] - corners[edge]

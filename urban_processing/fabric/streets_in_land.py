@@ -148,7 +148,10 @@ def streets_in_land(
     """
     polygons = np.array(list(land), dtype=object)
     laid = rim_streets(work, streets.width[work.line], polygons, snap=snap)
-    _, faces = find_faces(Centrelines(laid.inner, laid.inner_line), list(laid.land))
+    _, found = find_faces(Centrelines(laid.inner, laid.inner_line), list(laid.land))
+    # between the rim and a street on it there may be faces as thin as rounding
+    real = shapely.area(found.polygons) > 2 * NODE_GRID * shapely.length(found.polygons)
+    faces = replace(found, polygons=found.polygons[real], part=found.part[real])
     lines, entry, outside = _noded(laid, faces, snap)
     network = decompose_streets(
         lines,
@@ -176,10 +179,9 @@ def _noded(laid: RimStreets, faces: Faces, snap: float) -> tuple[NodedStreets, B
     pieces, source = pieces_on(
         faces.edges, np.asarray(shapely.linestrings(sources), dtype=object), on_rim.astype(float)
     )
-    line = np.append(laid.inner_line, laid.rim_line)[source]
+    pieces, source, vertex, xy = _without_hairs(pieces, source)
     part, rim = _place(pieces, on_rim[source], laid.land)
-    ends = np.unique(pieces.reshape(-1, 2) + 0.0, axis=0, return_inverse=True)
-    xy, vertex = ends[0], ends[1].reshape(-1, 2)
+    line = np.append(laid.inner_line, laid.rim_line)[source]
     street = (line >= 0) & (part >= 0)
     beyond = part < 0
     goes_on = _goes_on(vertex, pieces, beyond, len(xy), 2 * max(snap, NODE_GRID))
@@ -193,6 +195,24 @@ def _noded(laid: RimStreets, faces: Faces, snap: float) -> tuple[NodedStreets, B
     noded = NodedStreets(xy[used], new.reshape(-1, 2), line[street], part[street], rim[street])
     lengths = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     return noded, entry[used], float(lengths[beyond].sum())
+
+
+def _without_hairs(
+    pieces: FloatArray, source: IntArray
+) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
+    """Pieces that are longer than rounding, with their sources, end vertices, and all places.
+
+    Where others were, such as between the place where a street meets the rim and the rim, their
+    ends are one.
+    """
+    places, vertex = np.unique(pieces.reshape(-1, 2) + 0.0, axis=0, return_inverse=True)
+    vertex = vertex.reshape(-1, 2)
+    short = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T) < 2 * NODE_GRID
+    group = components(len(places), vertex[short])
+    _, first = np.unique(group, return_index=True)
+    vertex = group[vertex]
+    kept = ~short & (vertex[:, 0] != vertex[:, 1])
+    return pieces[kept], source[kept], vertex[kept], places[first]
 
 
 def _place(pieces: FloatArray, on_rim: BoolArray, land: Geometries) -> tuple[IntArray, IntArray]:

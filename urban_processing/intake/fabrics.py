@@ -174,7 +174,10 @@ class _Reading(Generic[C]):
         if self.first:
             self.follow("streets", features)
             return street_lines_in(features, self.projection, self.frame)
-        return build_streets(features, library=self.library, asked=self.asked).streets
+        found = build_streets(
+            features, library=self.library, asked=self.asked, result="what is measured is"
+        )
+        return found.streets
 
     def parcels(self, features: Features[C], cleaned: CleanedEach) -> ObservedParcels:
         """Parcels in the frame."""

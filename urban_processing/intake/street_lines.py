@@ -66,6 +66,7 @@ def build_streets(
     library: CrsLibrary[C],
     asked: C | None = None,
     land: Features[C] | None = None,
+    result: str = "the blocks are",
     problems: Sequence[str] = (),
 ) -> StreetsOnLand:
     """Make centrelines ready for the search for blocks.
@@ -86,6 +87,8 @@ def build_streets(
         Projected, metric CRS to work in; the CRS of lines that have none.
     land
         Polygons that blocks are cut at.
+    result
+        What the result is called in sentences, with its verb.
     problems
         What is wrong already: raised with all else that is.
 
@@ -112,7 +115,7 @@ def build_streets(
         library,
         issues,
         what="The streets are",
-        result="the blocks are",
+        result=result,
     )
     mapped = Projection(own, target, library).geometries(lines)
     _must_be_finite(mapped, features.name)

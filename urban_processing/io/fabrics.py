@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from urban_processing.io.features import PARQUET, Source, may_hold, read_feature
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers
 from urban_processing.io.layouts import layer_in
+from urban_processing.io.measured import GeoFabric
 from urban_processing.layout import Layout
 from urban_processing.layout_file.geopackage import LAYERS_STATE, LAYOUT_STATE, read_state
 from urban_processing.metrics import MeasuredLayout
@@ -66,20 +68,21 @@ def read_fabric(
         With everything that is wrong.
     """
     given = {"parcels": parcels, "streets": streets, "land": land}
+    name = Path(split_layer_name(source)[0]).stem if isinstance(source, str | PathLike) else ""
     ready = _ready(source)
     if ready is not None:
         besides = [name for name, value in given.items() if value is not None]
         if besides or crs is not None:
             named = ", ".join([*besides, *(["crs"] if crs is not None else [])])
             raise BoundaryError(f"A layout is ready as it is: leave out {named}.")
-        return ready
+        return replace(ready, name=ready.name or name)
     if source is not None:
         given = {**_layers_of(source, given), **{k: v for k, v in given.items() if v is not None}}
     problems: list[str] = []
     asked = asked_crs(crs, problems)
     read = {
-        name: _read(given.get(name), name, kind, layer, columns, problems)
-        for name, kind, layer, columns in (
+        called: _read(given.get(called), called, kind, layer, columns, problems)
+        for called, kind, layer, columns in (
             ("parcels", "polygon", PARCELS.name, PARCEL_COLUMNS),
             ("streets", "line", STREETS.name, STREET_COLUMNS),
             ("land", "polygon", BOUNDARY.name, ()),
@@ -87,15 +90,18 @@ def read_fabric(
     }
     if problems:
         raise BoundaryError(problems)
-    return build_fabric(
+    made = build_fabric(
         read["parcels"], read["streets"], read["land"], library=PYPROJ, asked=asked, params=params
     )
+    return replace(made, name=name)
 
 
 def _ready(source: Any) -> Fabric | None:
     """The fabric that a source is already; None for layers."""
     if isinstance(source, Fabric):
         return source
+    if isinstance(source, GeoFabric):
+        return source.measures.fabric
     if isinstance(source, MeasuredLayout):
         return LayoutMeasures(source.layout).of_fabric.fabric
     if isinstance(source, Layout):

@@ -65,10 +65,19 @@ def parcel_values(
         "area_cv": float(area.std() / mean_area) if n else math.nan,
         "area_min_over_mean": lowest(area) / mean_area,
         "area_max_over_min_area": highest(counted) / smallest,
-        "above_2_min_area_pct": percent(counted > 2.0 * smallest),
-        "above_3_min_area": int((counted > 3.0 * smallest).sum()),
+        **_above(counted, smallest),
         "net_area_mean_m2": mean(net),
         "net_area_min_m2": lowest(net),
+    }
+
+
+def _above(counted: FloatArray, smallest: float) -> dict[str, float]:
+    """Parcels that are large beside the smallest one allowed; none where none was promised."""
+    if math.isnan(smallest):
+        return {}
+    return {
+        "above_2_min_area_pct": percent(counted > 2.0 * smallest),
+        "above_3_min_area": int((counted > 3.0 * smallest).sum()),
     }
 
 
