@@ -1,73 +1,24 @@
 """The pictures of docs/gallery.md: ``python docs/gallery.py [NAME ...]``.
 
 Each picture is one function in `PICTURES`, made with the public API from `sample_data/`. Without
-names all are made, into docs/images/gallery.
+names all are made, into docs/images/gallery; those of data that are not there are left out.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
-import warnings
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from pathlib import Path
 
+import gallery_parcels
+import gallery_real
 import geopandas as gpd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from gallery_drawing import COLUMN, IMAGES, SAMPLES, Panel, blank, figure, laid_out, sheet, write
 from matplotlib.figure import Figure
-from PIL import Image
 from shapely import LineString, Point
 
 import urban_processing as up
-from urban_processing.io.frames import GeoLayers, GeoLayout
-
-ROOT = Path(__file__).resolve().parents[1]
-IMAGES = ROOT / "docs" / "images" / "gallery"
-COLUMN, MARGIN, HEAD, FOOT = 5.6, 0.15, 0.5, 0.6
-"""Width of one map, and the room beside, above and below it, in inches."""
-
-DOTS_PER_INCH = 100
-COLOURS = 256
-"""Colours of a picture: few make small files."""
-
-MOST_BYTES = 250_000
-
-Panel = tuple[str, GeoLayout | GeoLayers]
-
-
-def laid_out(name: str, **parameters: object) -> GeoLayout:
-    """Lay out a sample boundary."""
-    return up.cogenerate(ROOT / "sample_data" / f"{name}.gpkg", **parameters)
-
-
-def figure(layout: GeoLayout, name: str) -> float:
-    """Return a figure of the whole layout."""
-    metrics = layout.metrics
-    return float(metrics[metrics.part.isna() & (metrics.metric == name)].value.iloc[0])
-
-
-def sheet(panels: Sequence[Panel], *, columns: int, ratio: float) -> Figure:
-    """Draw maps side by side; `ratio` is the height of a map over its width."""
-    rows = -(-len(panels) // columns)
-    height = HEAD + COLUMN * ratio + FOOT
-    size = columns * COLUMN, rows * height
-    drawn = Figure(figsize=size, facecolor="white")
-    FigureCanvasAgg(drawn)
-    for k, (title, layout) in enumerate(panels):
-        left, top = (k % columns) * COLUMN, size[1] - (k // columns) * height
-        ax = drawn.add_axes(
-            (
-                (left + MARGIN) / size[0],
-                (top - HEAD - COLUMN * ratio) / size[1],
-                (COLUMN - 2 * MARGIN) / size[0],
-                COLUMN * ratio / size[1],
-            )
-        )
-        layout.plot(ax=ax)
-        place = (left + MARGIN) / size[0], (top - 0.12) / size[1]
-        drawn.text(*place, title, va="top", size=11)
-    return drawn
+from urban_processing.io.frames import GeoLayers
 
 
 def six_lands() -> Figure:
@@ -168,8 +119,7 @@ def rights_of_way() -> Figure:
     """Rights-of-way and net parcels: corners, turning heads, a given street of 24 m."""
     streets = frame(in_land([(-0.1, 0.35), (0.45, 0.27), (1.1, 0.4)]), width_m=[24.0])
     layout = laid_out("irregular_64ha", parcels=200, pattern="cul-de-sac", streets=streets)
-    drawn = Figure(figsize=(2 * COLUMN, COLUMN), facecolor="white")
-    FigureCanvasAgg(drawn)
+    drawn = blank(2 * COLUMN, COLUMN)
     windows = {"the whole": (-0.02, -0.02, 1.02, 1.02), "a part of it": (0.15, 0.05, 0.5, 0.4)}
     for k, (title, (x0, y0, x1, y1)) in enumerate(windows.items()):
         ax = drawn.add_axes((k / 2 + 0.01, 0.01, 0.48, 0.92))
@@ -187,7 +137,7 @@ def rights_of_way() -> Figure:
 @cache
 def land() -> gpd.GeoSeries:
     """The land of most pictures."""
-    return gpd.read_file(ROOT / "sample_data" / "irregular_64ha.gpkg").geometry
+    return gpd.read_file(SAMPLES / "irregular_64ha.gpkg").geometry
 
 
 def in_land(places: Sequence[tuple[float, float]]) -> LineString:
@@ -237,7 +187,7 @@ STREETS = ("aleppo", "auckland", "salt_lake_city", "schaan", "wuhan")
 @cache
 def blocks_of(name: str) -> GeoLayers:
     """Blocks between the streets of a sample."""
-    return up.find_blocks(ROOT / "sample_data" / f"streets_{name}.gpkg")
+    return up.find_blocks(SAMPLES / f"streets_{name}.gpkg")
 
 
 def strategies(name: str) -> Figure:
@@ -294,8 +244,7 @@ def edits() -> Figure:
         "a street widened": (streets, wider),
         "a street added": ([*streets, new], [12.0] * 9),
     }
-    drawn = Figure(figsize=(2 * COLUMN, 1.65 * COLUMN), facecolor="white")
-    FigureCanvasAgg(drawn)
+    drawn = blank(2 * COLUMN, 1.65 * COLUMN)
     before, house = None, None
     for k, (title, (lines, widths)) in enumerate(states.items()):
         layer = gpd.GeoDataFrame({"width_m": widths}, geometry=lines, crs="EPSG:32632")
@@ -334,22 +283,10 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     **{f"strategies_{name}": partial(strategies, name) for name in STREETS},
     "last_levels": last_levels,
     "edits": edits,
+    **gallery_real.PICTURES,
+    **gallery_parcels.PICTURES,
 }
 """Name of a picture's file, and the function that makes it."""
-
-
-def write(drawn: Figure, path: Path) -> None:
-    """Write a picture as a small PNG."""
-    full = io.BytesIO()
-    drawn.savefig(full, format="png", dpi=DOTS_PER_INCH)
-    few = (
-        Image.open(full)
-        .convert("RGB")
-        .quantize(COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    )
-    few.save(path, optimize=True)
-    if path.stat().st_size > MOST_BYTES:
-        warnings.warn(f"{path.name} has {path.stat().st_size:,} bytes.", stacklevel=2)
 
 
 def main() -> None:

@@ -152,6 +152,23 @@ def test_blocks_beside_an_artifact_stay(tmp_path: Path) -> None:
     assert block.area == pytest.approx(150 * 180, rel=0.02)
 
 
+def test_dead_ends_in_a_long_block_beside_an_artifact_stay(tmp_path: Path) -> None:
+    """The block is 85 m by 1 km, as between the parallel streets of a village."""
+    town = Town()
+    rows = (0.0, 85.0, 300.0)
+    for y in rows:
+        town.way((0.0, y), (500.0, y), (985.0, y), (1000.0, y))
+    for x in (0.0, 1000.0):
+        town.way(*[(x, y) for y in sorted([*rows, 70.0])])
+    town.way((985.0, 85.0), (1000.0, 70.0), highway="residential")
+    town.way((500.0, 85.0), (500.0, 30.0))
+    path = town.write(tmp_path / "town.osm")
+    cleaned = read_osm_streets(land(-20, -20, 1020, 320), osm_file=path)
+    (end,) = [place for place, degree in degrees_of(local(cleaned)).items() if degree == 1]
+    assert end == pytest.approx((500.0, 30.0), abs=0.1)
+    assert len(shapely.get_parts(shapely.polygonize(local(cleaned)))) == 2
+
+
 def test_motorway_stays_apart_and_its_slip_roads_end_on_the_street(tmp_path: Path) -> None:
     town = avenue_town()
     for x in (290.0, 310.0):

@@ -29,6 +29,11 @@ ROUNDABOUT = 5e3
 """Area in m² up to which a face among artifacts may be a roundabout; neatnet's 50,000 takes blocks
 away whose only neighbours are such."""
 
+LONG_FACE = 2e4
+"""Area in m² up to which a long face beside an artifact is one, too: those of this area are 43 m
+wide at most; neatnet's 100,000 takes blocks between parallel streets away, with the dead ends in
+them."""
+
 REACH = 30.0
 """Metres within which the end of a motorway's slip road follows a street that was moved."""
 
@@ -143,6 +148,7 @@ def _neatified(streets: Lines, crs: pyproj.CRS, many: bool) -> tuple[Lines, int,
                     n_loops=rounds,
                     artifact_threshold=None if many else SMALL_FACE,
                     area_threshold_circles=ROUNDABOUT,
+                    area_threshold_blocks=LONG_FACE,
                 )
             except _FAILURES as error:
                 failure = f"{type(error).__name__}: {_line(error)}"
