@@ -112,7 +112,10 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         if problems:
             raise QgsProcessingException("\n".join(problems))
         with errors_as_sentences():
-            dependencies.require_engine(maps=bool(destinations.of_kind(OutputKind.MAP)))
+            dependencies.require_engine(
+                maps=bool(destinations.of_kind(OutputKind.MAP)),
+                reports=bool(destinations.of_kind(OutputKind.REPORT)),
+            )
             from qgis_plugin.run import run
 
             params = self.spec.params.from_values(

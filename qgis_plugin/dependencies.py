@@ -19,26 +19,29 @@ from urban_processing.errors import DependencyError
 
 REQUIREMENTS = Path(__file__).with_name("requirements.txt")
 STARTUP = Path(__file__).with_name("import_shapely_first.py")
-FOR_MAPS = "matplotlib"
-"""Package that only maps need."""
+FOR_MAPS, FOR_REPORTS = "matplotlib", "jinja2"
+"""Packages that only maps and only reports need."""
 
-_LINE = re.compile(r"([A-Za-z_]+)\s*>=\s*([\d.]+)")
+_LINE = re.compile(r"([A-Za-z_0-9]+)\s*>=\s*([\d.]+)")
 
 
-def require_engine(*, maps: bool = False) -> None:
+def require_engine(*, maps: bool = False, reports: bool = False) -> None:
     """Import what the engine needs, in the way in which it works inside QGIS.
 
     Parameters
     ----------
     maps
         Whether a map will be drawn.
+    reports
+        Whether a report will be written.
 
     Raises
     ------
     DependencyError
         With one sentence for each package that is missing, too old, or does not work.
     """
-    wanted = {name: least for name, least in _required() if maps or name != FOR_MAPS}
+    unneeded = {name for name, asked in ((FOR_MAPS, maps), (FOR_REPORTS, reports)) if not asked}
+    wanted = {name: least for name, least in _required() if name not in unneeded}
     missing, old, broken = [], [], []
     with deep_binding():
         for name, least in wanted.items():

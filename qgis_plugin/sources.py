@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,7 @@ from qgis.PyQt.QtCore import QDate, QDateTime, Qt, QTime
 
 from qgis_plugin.crs import QgisCrs
 from qgis_plugin.definitions import CRS, input_of, is_given, parameter_name
-from qgis_plugin.fabrics import read_file
+from qgis_plugin.fabrics import COLUMNS, FabricLayers, FabricReader
 from qgis_plugin.feedback import stop_if_cancelled
 from qgis_plugin.geopackage import OGR
 from urban_processing.algorithms import AlgorithmSpec, Input, InputKind
@@ -35,11 +34,10 @@ from urban_processing.blocks.model import Blocks
 from urban_processing.blocks.streets import StreetsOnLand
 from urban_processing.calibration.model import Observed
 from urban_processing.errors import BoundaryError
-from urban_processing.fabric.model import REAL, ComparedFabrics, Fabric
+from urban_processing.fabric.model import ComparedFabrics, Fabric
 from urban_processing.intake.block_values import block_columns
 from urban_processing.intake.blocks import build_blocks
 from urban_processing.intake.editions import EditionLayers, build_editions
-from urban_processing.intake.fabrics import PARCEL_COLUMNS, build_fabric
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
@@ -55,7 +53,6 @@ from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.parcelling.reuse import Previous
 from urban_processing.persistence.editions import Editions
 from urban_processing.site import Site
-from urban_processing.tables import to_map
 
 if TYPE_CHECKING:
     from qgis_plugin.algorithm import SpecAlgorithm
@@ -256,63 +253,36 @@ class Sources:
     def _fabric(self, item: Input) -> Fabric:
         """Read what is measured, from its file or from layers."""
         name = parameter_name(item.name)
-        layers = self._layers_of_fabric()
+        path = None
         if is_given(self.parameters, name):
-            if layers[0] is not None or layers[1] is not None:
-                raise BoundaryError(f"Give “{item.label}”, or layers of parcels and streets.")
             path = Path(self.algorithm.parameterAsFile(self.parameters, name, self.context))
-            self.name = self.name or path.stem
-            return read_file(path, self._measuring(), self._crs_library())
-        if layers[0] is None and layers[1] is None:
-            raise BoundaryError(f"Give “{item.label}”, or layers of parcels, streets, or both.")
-        self.name = self.name or next(layer.name for layer in layers if layer is not None)
-        return replace(self._built(*layers), name=self.name)
+        fabric = self._fabrics_reader().measured(path, self._layers_of_fabric(), item.label)
+        self.name = self.name or fabric.name
+        return fabric
 
     def _fabrics(self, item: Input) -> ComparedFabrics:
         """Read what is compared: files, and what is there."""
         paths = self.algorithm.parameterAsFileList(
             self.parameters, parameter_name(item.name), self.context
         )
-        made = [read_file(Path(p), self._measuring(), self._crs_library()) for p in paths]
-        if not made:
-            raise BoundaryError(f"Give “{item.label}”: one file, or more.")
-        self.name = self.name or made[0].name
-        parcels, streets, land = self._layers_of_fabric()
-        if parcels is None and streets is None:
-            return ComparedFabrics(tuple(made))
-        if land is None:
-            frame = made[0].frame
-            crs = self._crs_library().from_text(frame.crs) if frame.crs else None
-            land = Features(
-                to_map(made[0].land, frame), crs, f"the land of {made[0].name}", bare=crs is None
-            )
-        real = replace(self._built(parcels, streets, land), name=REAL)
-        return ComparedFabrics(tuple(made), real)
+        reader, layers = self._fabrics_reader(), self._layers_of_fabric()
+        compared = reader.compared([Path(path) for path in paths], layers, item.label)
+        self.name = self.name or compared.made[0].name
+        return compared
 
-    def _built(self, *layers: Features[QgsCoordinateReferenceSystem] | None) -> Fabric:
-        return build_fabric(*layers, library=self._crs_library(), params=self._measuring())
-
-    def _layers_of_fabric(self) -> list[Features[QgsCoordinateReferenceSystem] | None]:
-        """Parcels, streets and land that were given as layers."""
-        wanted = {
-            InputKind.PARCEL_LAYER: PARCEL_COLUMNS,
-            InputKind.STREET_LAYER: STREET_COLUMNS,
-            InputKind.LAND: (),
-        }
-        found = []
-        for kind, columns in wanted.items():
-            item = input_of(self.algorithm.spec, kind)
-            found.append(None if item is None else self._features(item, columns))
-        return found
-
-    def _measuring(self) -> MeasureParams:
-        """The parameters, which are those of an algorithm that measures."""
+    def _fabrics_reader(self) -> FabricReader:
         if not isinstance(self.params, MeasureParams):
             raise TypeError(f"{type(self.params).__name__} has no parameters of measuring.")
-        return self.params
+        library = QgisCrs(self.context.transformContext())
+        return FabricReader(self.params, library, self._asked_crs())
 
-    def _crs_library(self) -> QgisCrs:
-        return QgisCrs(self.context.transformContext())
+    def _layers_of_fabric(self) -> FabricLayers:
+        """Parcels, streets and land that were given as layers."""
+        found = []
+        for kind, columns in COLUMNS.items():
+            item = input_of(self.algorithm.spec, kind)
+            found.append(None if item is None else self._features(item, columns))
+        return FabricLayers(*found)
 
     def _features(
         self, item: Input, wanted: Sequence[str] | None = GIVEN_COLUMNS

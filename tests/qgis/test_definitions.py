@@ -17,10 +17,11 @@ from qgis.core import (
     QgsProcessingParameterFeatureSource,
     QgsProcessingParameterFile,
     QgsProcessingParameterFileDestination,
+    QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
 )
 
-from urban_processing.algorithms import AlgorithmSpec, InputKind, specs
+from urban_processing.algorithms import AlgorithmSpec, InputKind, OutputKind, specs
 from urban_processing.algorithms.json_schema import description
 from urban_processing.cli.options import command_parameters
 from urban_processing.params import ParamField
@@ -31,6 +32,7 @@ FREE = 1e300
 SHELL_ONLY = {
     "cli": {
         *("place", "layer", "where"),  # QGIS has layers, filters and selections
+        *("osm_file", "osm"),  # streets of OpenStreetMap are a layer
         *("overwrite", "record_seconds", "export", "export_format", "quiet"),
         "processes",  # the program that runs QGIS is not Python
     },
@@ -147,10 +149,16 @@ def test_inputs_are_layers_of_the_right_kind(algorithm: Any, spec: AlgorithmSpec
     optional = QgsProcessingParameterDefinition.Flag.FlagOptional
     for item in spec.inputs:
         asked = algorithm.parameterDefinition(item.name.upper())
+        if item.kind is InputKind.OPEN_STREET_MAP:
+            assert asked is None
+            continue
         assert bool(asked.flags() & optional) is not item.required
         assert asked.description() == item.label
-        if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION):
+        if item.kind in (InputKind.LAYOUT, InputKind.SUBDIVISION, InputKind.FABRIC):
             assert isinstance(asked, QgsProcessingParameterFile)
+        elif item.kind is InputKind.FABRICS:
+            assert isinstance(asked, QgsProcessingParameterMultipleLayers)
+            assert asked.layerType() == QgsProcessing.SourceType.TypeFile
         else:
             assert isinstance(asked, QgsProcessingParameterFeatureSource)
             assert asked.dataTypes() == [INPUTS[item.kind]]
@@ -174,9 +182,23 @@ def test_results_are_sinks_and_files_and_all_optional(algorithm: Any, spec: Algo
     shown = {f"{o.name}_{layer.name}" for o in spec.outputs for layer in o.layers if layer.shown}
     assert by_default == {name.upper() for name in shown}
     files = {n for n, d in made.items() if isinstance(d, QgsProcessingParameterFileDestination)}
-    assert files == {"OUTPUT", "PLOT"}
-    assert made["OUTPUT"].defaultFileExtension() == "gpkg"
-    assert made["PLOT"].defaultFileExtension() == "png"
+    endings = {
+        OutputKind.LAYOUT: "gpkg",
+        OutputKind.LAYERS: "gpkg",
+        OutputKind.MAP: "png",
+        OutputKind.REPORT: "html",
+        OutputKind.JSON: "json",
+        OutputKind.CSV: "csv",
+    }
+    wanted = {o.name.upper(): endings[o.kind] for o in spec.outputs if o.kind in endings}
+    assert {name: made[name].defaultFileExtension() for name in files} == wanted
+
+
+@pytest.mark.parametrize("name", ["measure", "compare"])
+def test_a_report_is_shown_by_the_results_viewer(provider: Any, name: str) -> None:
+    found = QgsApplication.processingRegistry().algorithmById(f"urban_processing:{name}")
+    assert found.outputDefinition("REPORT").type() == "outputHtml"
+    assert found.outputDefinition("JSON").type() == "outputFile"
 
 
 def test_it_can_run_as_a_batch_and_in_models(algorithm: Any) -> None:

@@ -57,6 +57,19 @@ def test_what_only_maps_need_is_asked_for_maps_alone(
         run(land, PARCELS=4, PLOT=str(tmp_path / "map.png"))
 
 
+def test_what_only_reports_need_is_asked_for_reports_alone(
+    layer: Callable[..., Any], provider: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import processing
+
+    without(monkeypatch, "jinja2")
+    call = {"PARCEL_LAYER": layer([square(100)]), "JSON": str(tmp_path / "m.json")}
+    processing.run("urban_processing:measure", call)
+    call["REPORT"] = str(tmp_path / "m.html")
+    with pytest.raises(QgsProcessingException, match=r"lacks jinja2 >= 3\.1"):
+        processing.run("urban_processing:measure", call)
+
+
 def with_shapely(dependencies: Any, monkeypatch: pytest.MonkeyPatch, version: str) -> None:
     load = importlib.import_module
 

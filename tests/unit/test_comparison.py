@@ -317,15 +317,18 @@ def test_a_comparison_of_nothing_has_empty_tables() -> None:
 
 def test_words_say_who_is_better_and_what_differs_most() -> None:
     told = words(three_sides())
-    assert told[0] == ("better", "a in 0, b in 1, c <&> in 0 of 2 metrics, 1 alike")
+    assert told[0] == (
+        "better",
+        "a in 0, b in 1, c <&> in 0 of 2 metrics that tell better from worse, 1 alike",
+    )
     assert told[1] == ("distributions", "2 of 2 differ by more than chance")
     (name, text), other = told[2:]
     assert name == other[0] == "width of parcels"
-    assert "m apart (" in text
+    assert "m apart on average (" in text
     assert "median" in text
     two = words(compared(side("a", {"area_m2": 1.0}), side("b", {"area_m2": 2.0})))
     assert two == (
-        ("better", "a in 0, b in 0 of 0 metrics"),
+        ("better", "no metric that two sides have tells better from worse"),
         ("distributions", "0 of 0 differ by more than chance"),
     )
 
@@ -333,7 +336,7 @@ def test_words_say_who_is_better_and_what_differs_most() -> None:
 def test_words_of_a_single_value_name_no_interval() -> None:
     many = list(np.linspace(10.0, 20.0, 60))
     told = dict(words(compared(side("a", parcel_width_m=many), side("b", parcel_width_m=[90.0]))))
-    assert told["width of parcels"] == "75.0 m apart, median 90.0 in b, 15.0 in a"
+    assert told["width of parcels"] == ("median 90.0 m in b, 15.0 m in a; 75.0 m apart on average")
 
 
 def test_words_do_not_count_interior_parcels_twice() -> None:
@@ -341,7 +344,7 @@ def test_words_do_not_count_interior_parcels_twice() -> None:
     worse = {"irregularity": 0.5, "irregularity_interior": 0.5}
     assert words(compared(side("a", values), side("b", worse)))[0] == (
         "better",
-        "a in 1, b in 0 of 1 metrics",
+        "a in 1, b in 0 of 1 metrics that tell better from worse",
     )
 
 

@@ -50,9 +50,11 @@ from urban_processing.report.html.charts import chart, line_of
 from urban_processing.report.html.digits import decimals_for, number, signed
 from urban_processing.report.html.labels import GROUPS, group, label
 from urban_processing.report.html.maps import map_sheet
+from urban_processing.report.html.metric_rows import metric_groups, one_sided
+from urban_processing.report.html.summary import verdict
 from urban_processing.report.html.svg import area_paths, stage_of
 from urban_processing.report.html.text import isolate
-from urban_processing.report.html.themes import HATCHED, themes
+from urban_processing.report.html.themes import HATCHED, MOST_EDGES, round_edges, themes
 
 SECTIONS = [
     "summary",
@@ -259,7 +261,7 @@ def test_issues_are_counted_and_the_first_are_shown(pages: dict[str, str]) -> No
 def test_what_is_not_known_is_said_in_words(pages: dict[str, str]) -> None:
     html = pages["parcels on one side"]
     assert '<span aria-hidden="true">—</span><span class="sr">not known</span>' in html
-    assert "Parcels are not known." in html
+    assert "Not known of osm." in html
     assert "nan" not in re.sub(r"<[^>]*>", " ", pages["nothing defined"]).lower().split()
 
 
@@ -282,11 +284,11 @@ def test_distances_are_told_in_a_sentence() -> None:
     new = replace(side, name="new", samples={"parcel_area_m2": Sample(areas + 35.0)})
     html = report_html(compared([old, new]))
     text = " ".join(Reader(html).all("main")[0].text.split())
-    assert "In the mean 35 m² larger in new than in old; the distributions differ by more" in text
+    assert "On average 35 m² larger in new than in old; the distributions differ by more" in text
     text = " ".join(
         Reader(report_html(compared([old, replace(old, name="b")]))).all("main")[0].text.split()
     )
-    assert "In the mean alike in b and old; the distributions differ no more than by chance" in text
+    assert "On average alike in b and old; the distributions differ no more than by chance" in text
 
 
 def test_a_report_needs_a_comparison_of_its_own_sides() -> None:
@@ -314,8 +316,10 @@ def test_maps_have_common_classes_and_one_scale(reports: dict[str, Report]) -> N
         "level",
         "undesirable",
         "streets",
+        "blocks",
     ]
     for group_ in sheet.groups:
+        # one side is a single parcel without streets inside, whose cuts are known all the same
         assert len(group_.panels) == 3
         assert all(len(row.amounts) == 3 for row in group_.legend)
     # the bar is as long as it says
@@ -330,11 +334,60 @@ def test_maps_have_common_classes_and_one_scale(reports: dict[str, Report]) -> N
         assert all(int(x) <= sheet.width and int(y) <= sheet.height for x, y in numbers)
 
 
+def test_a_map_is_only_of_sides_that_have_something_to_show(reports: dict[str, Report]) -> None:
+    sheet = map_sheet(reports["parcels on one side"])
+    assert sheet is not None
+    shown = {g.name: [panel.side for panel in g.panels] for g in sheet.groups}
+    assert list(shown)[:2] == ["streets", "blocks"]  # what all have comes first
+    assert shown["streets"] == shown["blocks"] == ["grid", "osm"]
+    assert shown["irregularity"] == shown["level"] == ["grid"]
+    for group_ in sheet.groups:
+        assert all(len(row.amounts) == len(group_.panels) for row in group_.legend)
+        assert ("Not known of osm." in group_.note) == (len(group_.panels) == 1)
+    side = side_of(small_grid(), "as found")
+    parcels = side.table("parcels")
+    assert parcels is not None
+    parcels.columns["level"][:] = np.nan
+    sheet = map_sheet(compared([side_of(small_grid()), side]))
+    assert sheet is not None
+    (level,) = [g for g in sheet.groups if g.name == "level"]
+    assert [panel.side for panel in level.panels] == ["grid"]
+    assert "Not known of as found." in level.note
+    sheet = map_sheet(Report((side,)))
+    assert sheet is not None
+    assert "level" not in [g.name for g in sheet.groups]
+
+
+@given(
+    st.floats(1.0, 1e7),
+    st.floats(1.0, 1e5),
+)
+def test_edges_of_classes_are_round_and_lie_between(low: float, ratio: float) -> None:
+    edges = round_edges(low, low * ratio)
+    assert len(edges) <= MOST_EDGES
+    assert edges == sorted(set(edges))
+    assert all(low * (1 - 1e-6) <= edge <= low * ratio * (1 + 1e-6) for edge in edges)
+    assert edges or ratio < 1.001
+    for edge in edges:
+        assert f"{edge:.4g}" == f"{edge:.12g}" or float(f"{edge:.4g}") == pytest.approx(edge)
+
+
+def test_blocks_are_counted_in_the_class_of_their_area() -> None:
+    sheet = map_sheet(two_reports())
+    assert sheet is not None
+    (blocks,) = [g for g in sheet.groups if g.name == "blocks"]
+    for k, panel in enumerate(blocks.panels):
+        areas = re.findall(r'<path fill="([^"]+)" d="([^"]+)"', panel.shapes)
+        for fill, d in areas:
+            (row,) = [r for r in blocks.legend if r.fill == fill]
+            assert row.amounts[k].split(" ")[0] == str(d.count("M"))
+
+
 def test_every_parcel_is_drawn_once_in_the_colour_of_its_class() -> None:
     report = one_report()
     sheet = map_sheet(report)
     assert sheet is not None
-    for group_ in sheet.groups[:-1]:
+    for group_ in (g for g in sheet.groups if g.counts == "Parcels"):
         areas = re.findall(r'<path fill="([^"]+)" d="([^"]+)"', group_.panels[0].shapes)
         assert sum(d.count("M") for _, d in areas) == 20
         for fill, d in areas:
@@ -443,6 +496,94 @@ def test_numbers_have_the_digits_that_make_sense(
 ) -> None:
     assert decimals_for(values) == decimals
     assert [number(v, decimals) for v in values] == texts
+
+
+def test_metrics_of_one_side_stand_apart(reports: dict[str, Report]) -> None:
+    report = reports["parcels on one side"]
+    assert report.comparison is not None
+    osm = report.sides[1]
+    few = {k: v for k, v in osm.values.items() if k in ("area_m2", "blocks", "street_length_m")}
+    report = compared([report.sides[0], replace(osm, values=few)])
+    assert report.comparison is not None
+    common = [line.term for g in metric_groups(report) for line in g.lines]
+    assert common == ["area_m2", "street_length_m", "blocks"]
+    (alone,) = one_sided(report)
+    assert alone.side == "grid"
+    rest = [line for g in alone.groups for line in g.lines]
+    assert len(common) + len(rest) == len(report.comparison.rows)
+    assert all(len(line.values) == 1 and line.better is None for line in rest)
+    html = report_html(report)
+    assert "Known of grid alone" in html
+    assert one_sided(reports["one"]) == one_sided(reports["alike"]) == []
+
+
+def test_no_difference_is_shown_from_a_reference_without_values() -> None:
+    side = side_of(small_grid(), "osm")
+    known = {k: v for k, v in side.values.items() if k != "parcels"}
+    with_parcels = [replace(side_of(small_grid(), name), samples={}) for name in ("a", "b")]
+    report = compared([replace(side, values=known, samples={}), *with_parcels])
+    groups = {g.title: g for g in metric_groups(report)}
+    assert groups["Blocks"].differs
+    some = [line for g in groups.values() for line in g.lines if line.term == "parcels"]
+    assert [line.differences for line in some[:1]] == [(("", ""), ("", ""))]
+    assert report.heading == "osm, a and b"
+
+
+def test_the_better_value_looks_different() -> None:
+    side = replace(side_of(small_grid(), "a"), samples={})
+    sides = [replace(side, values={"p_area": 1.0512}), replace(side, values={"p_area": 1.0514})]
+    (group_,) = metric_groups(compared([sides[0], replace(sides[1], name="b")]))
+    assert group_.lines[0].values == ("1.0512", "1.0514")
+    assert group_.lines[0].better == 0
+
+
+def test_land_without_streets_says_so() -> None:
+    side = replace(side_of(small_grid()), values={"blocks": 0.0, "street_length_m": 0.0})
+    text = report_html(Report((side,)))
+    assert "<dd>none.</dd>" in text
+    assert "<dd>none inside the land.</dd>" in text
+    assert "longer than not known" not in text
+
+
+def test_differences_are_told_in_percent_or_points() -> None:
+    side = side_of(small_grid(), "a")
+    known = {"area_m2": 200.0, "quads_pct": 50.0, "dead_ends": 0.0, "circuity": 1.0}
+    other = {"area_m2": 300.0, "quads_pct": 60.0, "dead_ends": 3.0, "circuity": 1.0}
+    report = compared([replace(side, values=known), replace(side, name="b", values=other)])
+    found = {line.term: line.differences for g in metric_groups(report) for line in g.lines}
+    assert found == {
+        "area_m2": (("+100", "+50\u00a0%"),),
+        "quads_pct": (("+10", "points"),),
+        "dead_ends": (("+3", ""),),
+        "circuity": (("0", ""),),
+    }
+
+
+def test_the_verdict_names_what_each_side_is_better_in() -> None:
+    side = side_of(small_grid(), "old")
+    low = {"circuity": 1.1, "quads_pct": 90.0, "p_area": 1.0, "thinness_min": 0.5}
+    high = {"circuity": 1.3, "quads_pct": 80.0, "p_area": 1.0, "thinness_min": 0.6}
+    sides = [replace(side, values=low, samples={}), replace(side, name="new", values=high)]
+    report = compared([sides[0], replace(sides[1], samples={})])
+    assert report.comparison is not None
+    assert verdict(report.comparison, ("<old>", "new")) == [
+        (
+            "Better",
+            "<old> in 2 and new in 1 of the 4 metrics that tell better from worse and that both "
+            "sides have a value of; 1 alike.",
+        ),
+        ("Better in <old>", "Share of quadrilaterals and Circuity."),
+        ("Better in new", "Smallest thinness."),
+        ("Distributions", "Two sides have no values in common that could be compared."),
+    ]
+    assert "Comparison of new with old." in report_html(report)
+
+
+def test_small_shares_are_told_in_powers_of_ten() -> None:
+    check = Check("land_covered", True, 1.25e-16, 1e-8, "fine")
+    text = report_html(Report((replace(GRID_SIDE, certificate=Certificate((check,))),)))
+    assert "1.25\u00a0×\u00a010⁻¹⁶" in text
+    assert "e-1" not in re.sub(r"<[^>]*>", " ", text)
 
 
 def test_differences_have_signs() -> None:

@@ -83,11 +83,16 @@ class InputKind(enum.StrEnum):
     @property
     def is_ground(self) -> bool:
         """Whether such an input is what the work is done on: it has a frame, and issues."""
-        return self.chooses_crs or self in (InputKind.PARCELS_BEFORE, InputKind.FABRIC)
+        return self.chooses_crs or self is InputKind.PARCELS_BEFORE
 
     @property
     def chooses_crs(self) -> bool:
         """Whether the user may choose the CRS in which such an input is worked on."""
+        return self.is_layer or self in (InputKind.FABRIC, InputKind.FABRICS)
+
+    @property
+    def is_layer(self) -> bool:
+        """Whether such an input is one layer, of which the user may choose features."""
         return self in (
             InputKind.BOUNDARY,
             InputKind.CENTRELINES,

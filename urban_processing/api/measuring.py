@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from os import PathLike
 from typing import Any
 
-from urban_processing.fabric.model import Fabric
+from urban_processing.api.gathering import gathered
+from urban_processing.errors import ParameterError
 from urban_processing.io.comparison import read_compared
-from urban_processing.io.fabrics import read_fabric
+from urban_processing.io.fabrics import Measurable, read_fabric
 from urban_processing.io.features import Source
-from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.measured import GeoComparison, GeoFabric
 from urban_processing.params.compare import CompareParams
 from urban_processing.params.measure import MeasureParams
 from urban_processing.pipelines import measure as pipeline
 from urban_processing.progress import SILENT, Progress
-
-Measurable = GeoLayout | GeoLayers | GeoFabric | Fabric | str | PathLike[str]
-"""What can be measured as it is; parcels and streets of other origin are given as layers."""
 
 
 def measure(
@@ -27,6 +25,7 @@ def measure(
     parcels: Source | None = None,
     streets: Source | None = None,
     land: Source | None = None,
+    crs: object = None,
     progress: Progress = SILENT,
     **parameters: Any,
 ) -> GeoFabric:
@@ -35,12 +34,14 @@ def measure(
     Parameters
     ----------
     layout
-        What `cogenerate`, `optimize` or `subdivide` made, its file, or another file with one
-        layer of parcels and one of streets.
+        What `cogenerate`, `optimize` or `subdivide` made, its file, another file with one layer
+        of parcels and one of streets, or a GeoDataFrame of either.
     parcels, streets
         Instead: polygons and lines, as files, GeoDataFrames or geometries; one may be left out.
     land
         Polygons that they are cut at; by default what they cover.
+    crs
+        Projected CRS in metres to work in with layers; the CRS of layers that have none.
     progress
         Told how far the work is; may stop it.
     **parameters
@@ -54,7 +55,7 @@ def measure(
     Raises
     ------
     BoundaryError, ParameterError
-        With everything that is wrong.
+        With everything that is wrong; an `UrbanError` where both layers and parameters are.
 
     Examples
     --------
@@ -64,10 +65,16 @@ def measure(
     >>> found = measure(parcels=[left, right], streets=[street])
     >>> found.metric("parcels"), found.metric("quads_pct")
     (2.0, 100.0)
+    >>> found.report("report.html")  # doctest: +SKIP
     """
-    params = MeasureParams.from_values(parameters)
-    fabric = read_fabric(layout, parcels=parcels, streets=streets, land=land, params=params)
-    return GeoFabric(pipeline.measure(fabric, params, progress))
+    usable = None if MeasureParams.problems_with(parameters) else MeasureParams(**parameters)
+    params, fabric = gathered(
+        lambda: MeasureParams.from_values(parameters),
+        lambda: read_fabric(
+            layout, parcels=parcels, streets=streets, land=land, crs=crs, params=usable
+        ),
+    )
+    return GeoFabric.of(pipeline.measure(fabric, params, progress))
 
 
 def compare(
@@ -78,6 +85,7 @@ def compare(
     osm_file: str | PathLike[str] | None = None,
     osm: bool = False,
     land: Source | None = None,
+    crs: object = None,
     progress: Progress = SILENT,
     **parameters: Any,
 ) -> GeoComparison:
@@ -97,6 +105,8 @@ def compare(
         Whether these are fetched from OpenStreetMap's server; they are kept for the next time.
     land
         Polygons that what is there is cut at; by default the land of the first layout.
+    crs
+        Projected CRS in metres to work in with layers; the CRS of layers that have none.
     progress
         Told how far the work is; may stop it.
     **parameters
@@ -110,7 +120,7 @@ def compare(
     Raises
     ------
     BoundaryError, ParameterError
-        With everything that is wrong.
+        With everything that is wrong; an `UrbanError` where both sides and parameters are.
 
     Examples
     --------
@@ -119,16 +129,29 @@ def compare(
     >>> found = up.compare(layout, osm_file="mauren.osm.bz2")  # doctest: +SKIP
     >>> found.comparison[["metric", "difference"]]  # doctest: +SKIP
     """
-    params = CompareParams.from_values(parameters)
-    named = [(names[k] if k < len(names) else "", layout) for k, layout in enumerate(layouts)]
-    compared = read_compared(
-        named,
-        parcels=parcels,
-        streets=streets,
-        land=land,
-        osm_file=osm_file,
-        osm=osm,
-        params=params,
-        progress=progress.slice(0.0, 0.3),
+    named = _named(layouts, names)
+    wrong = CompareParams.problems_with(parameters)
+    params, compared = gathered(
+        lambda: CompareParams.from_values(parameters),
+        lambda: read_compared(
+            named,
+            parcels=parcels,
+            streets=streets,
+            land=land,
+            osm_file=osm_file,
+            osm=osm,
+            crs=crs,
+            params=CompareParams() if wrong else CompareParams.from_values(parameters),
+            fetch=not wrong,
+            progress=progress.slice(0.0, 0.3),
+        ),
     )
-    return GeoComparison(pipeline.compare_fabrics(compared, params, progress.slice(0.3, 1.0)))
+    return GeoComparison.of(pipeline.compare_fabrics(compared, params, progress.slice(0.3, 1.0)))
+
+
+def _named(layouts: Sequence[Measurable], names: Sequence[str]) -> list[tuple[str, Measurable]]:
+    """Layouts with the names that were given to the first of them."""
+    given = [names] if isinstance(names, str) else list(names)
+    if len(given) > len(layouts):
+        raise ParameterError(f"names has {len(given)} names for {len(layouts)} layout(s).")
+    return list(zip_longest(given, layouts, fillvalue=""))

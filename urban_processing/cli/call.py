@@ -75,12 +75,11 @@ def _output_problems(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[str]
 
 
 def _paths(given: Any) -> tuple[str, ...]:
-    """Files that were given for an input, names of sides taken off."""
+    """Files that were given for an input, without names of sides and layers."""
     if given is None:
         return ()
-    if isinstance(given, tuple):
-        return tuple(named_file(text)[1] for text in given)
-    return (given,)
+    paths = [named_file(text)[1] for text in given] if isinstance(given, tuple) else [given]
+    return tuple(path.partition("|")[0] for path in paths)
 
 
 def _flags(output: Output) -> str:

@@ -131,11 +131,11 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
         required=False,
         type=click.Path(),
         nargs=-1 if several else 1,
-        metavar=option_name(item.name).upper(),
+        metavar=option_name(item.name).upper() + ("..." if several else ""),
         help=item.help,
     )
-    if not item.kind.chooses_crs:
-        return [argument]
+    if not item.kind.is_layer:
+        return [argument, *([_crs_option()] if item.kind.chooses_crs else [])]
     if item.kind is not InputKind.BOUNDARY:
         return [argument, *_choice_of_features()]
     place = "Instead of a file: a place that OpenStreetMap knows, as 'Wandsworth, London'."
@@ -147,7 +147,6 @@ def _input_parameters(item: Input) -> list[click.Parameter]:
 
 
 def _choice_of_features() -> list[click.Parameter]:
-    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
     return [
         _option("--layer", metavar="NAME", panel=INPUT, help="Layer of a file that has several."),
         _option(
@@ -156,8 +155,13 @@ def _choice_of_features() -> list[click.Parameter]:
             panel=INPUT,
             help="Which features to take, as after WHERE in SQL: \"name = 'Schaan'\".",
         ),
-        _option("--crs", metavar="CODE", panel=INPUT, help=crs),
+        _crs_option(),
     ]
+
+
+def _crs_option() -> click.Parameter:
+    crs = "Projected CRS in metres to work in, as EPSG:32630; the CRS of a file that has none."
+    return _option("--crs", metavar="CODE", panel=INPUT, help=crs)
 
 
 class HelpArgument(click.Argument):

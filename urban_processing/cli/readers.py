@@ -226,12 +226,16 @@ def _read_fabric(
             f"or layers with {flags}."
         )
         return None
-    params = _usable(MeasureParams, values_given(spec, given))
-    if params is None:
-        return None
     from urban_processing.io.fabrics import read_fabric
 
-    return read_fabric(given[item.name], parcels=parcels, streets=streets, land=land, params=params)
+    return read_fabric(
+        given[item.name],
+        parcels=parcels,
+        streets=streets,
+        land=land,
+        crs=given["crs"],
+        params=_usable(MeasureParams, values_given(spec, given)),
+    )
 
 
 @_collecting
@@ -247,12 +251,6 @@ def _read_fabrics(
         )
         return None
     parcels, streets, land = _layers_of(spec, given)
-    if given["osm"] and given["osm_file"] is not None:
-        problems.append("Give --osm or --osm-file, not both.")
-        return None
-    params = _usable(CompareParams, values_given(spec, given))
-    if params is None:
-        return None
     from urban_processing.io.comparison import read_compared
 
     return read_compared(
@@ -262,7 +260,9 @@ def _read_fabrics(
         land=land,
         osm_file=given["osm_file"],
         osm=given["osm"],
-        params=params,
+        crs=given["crs"],
+        params=_usable(CompareParams, values_given(spec, given)) or CompareParams(),
+        fetch=not problems,  # no call over the network for a run that cannot begin
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -184,7 +184,7 @@ class Fabric:
     net_min_area
         Whether that is a promise about net parcels.
     issues
-        What reading has to say.
+        What reading has to say; nothing of a layout, which has issues of its own.
     history
         Steps that made it, oldest first; none for what was found.
     input_sha256
@@ -218,6 +218,11 @@ class Fabric:
         """(K,) the network edges as lines in local metres."""
         return self.network.lines(self.lines)
 
+    @property
+    def all_issues(self) -> tuple[Issue, ...]:
+        """Issues of the layout, and what reading has to say."""
+        return self.issues if self.layout is None else (*self.layout.issues, *self.issues)
+
 
 @dataclass(frozen=True, eq=False)
 class ComparedFabrics:
@@ -238,3 +243,17 @@ class ComparedFabrics:
     def all(self) -> tuple[Fabric, ...]:
         """All fabrics, what is there last."""
         return self.made if self.real is None else (*self.made, self.real)
+
+    @property
+    def frame(self) -> Frame:
+        """Where the first one lies on the map."""
+        return self.made[0].frame
+
+    @property
+    def issues(self) -> tuple[Issue, ...]:
+        """What reading has to say, each with the name of what it is about."""
+        return tuple(
+            replace(issue, message=f"{fabric.name or 'layout'}: {issue.message}")
+            for fabric in self.all
+            for issue in fabric.issues
+        )

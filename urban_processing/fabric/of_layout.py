@@ -68,7 +68,6 @@ def fabric_of_layout(
         inner_edges=_inner_edges(layout),
         min_area=layout.min_area,
         net_min_area=layout.street_rules.net_min_area,
-        issues=layout.issues,
         history=layout.history,
         input_sha256=layout.digest,
         layout=layout,

@@ -326,8 +326,9 @@ def _must_meet(
         crs = reading.frame.crs
         in_crs = f" in {crs}" if crs and len(crs) < 20 else ""
         raise BoundaryError(
-            f"The {base} and the {name} do not overlap: the {base} lie at "
-            f"{_where(first, reading.frame)}, the {name} at {_where(box, reading.frame)}{in_crs}. "
+            f"The {base} and the {name} do not overlap: the first lie within "
+            f"{_where(first, reading.frame)}, the second within "
+            f"{_where(box, reading.frame)}{in_crs}. "
             "Check the CRS of both layers, and that they are of one place."
         )
 

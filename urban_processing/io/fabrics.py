@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import pyogrio
 import pyproj
@@ -20,24 +20,32 @@ from urban_processing.intake.fabrics import PARCEL_COLUMNS, build_fabric
 from urban_processing.intake.features import Features
 from urban_processing.intake.street_lines import STREET_COLUMNS
 from urban_processing.io.crs import PYPROJ, asked_crs
-from urban_processing.io.features import PARQUET, Source, may_hold, read_features, split_layer_name
+from urban_processing.io.features import (
+    PARQUET,
+    Source,
+    may_hold,
+    must_exist,
+    read_features,
+    split_layer_name,
+)
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers
 from urban_processing.io.layouts import layer_in
 from urban_processing.io.measured import GeoFabric
 from urban_processing.layout import Layout
+from urban_processing.layout_file.files import as_written
 from urban_processing.layout_file.geopackage import LAYERS_STATE, LAYOUT_STATE, read_state
 from urban_processing.metrics import MeasuredLayout
 from urban_processing.metrics.measures import LayoutMeasures
 from urban_processing.params.measure import MeasureParams
 from urban_processing.schema import BOUNDARY, PARCELS, STREETS
 
-_BLOCKS = "blocks"
-"""Kind of a file that `blocks` wrote."""
+Measurable: TypeAlias = "Source | MeasuredLayout | Layout | GeoLayers | Fabric"
+"""What can be measured as it is; see `read_fabric`."""
 
 
 def read_fabric(
-    source: Source | MeasuredLayout | Layout | GeoLayers | Fabric | None = None,
+    source: Measurable | None = None,
     *,
     parcels: Source | None = None,
     streets: Source | None = None,
@@ -52,7 +60,8 @@ def read_fabric(
     source
         A layout or its file; a file with a layer of parcels and one of streets (those of these
         names, else the only ones with polygons and with lines); a frame of polygons or of lines;
-        what `subdivide` made, or its file, in which there are no streets.
+        what `subdivide` made, or its file, in which there are no streets; what was measured
+        before.
     parcels, streets, land
         Polygons, lines and polygons instead of those of `source`, or besides: files, also
         followed by a layer as in ``file.gpkg|layername=plots``, GeoDataFrames, GeoSeries or
@@ -62,27 +71,32 @@ def read_fabric(
     params
         Widths and tolerances.
 
+    Returns
+    -------
+    Fabric
+        Called as its file is, without the ending; without a name if it comes from no file.
+
     Raises
     ------
     BoundaryError
         With everything that is wrong.
     """
     given = {"parcels": parcels, "streets": streets, "land": land}
-    name = Path(split_layer_name(source)[0]).stem if isinstance(source, str | PathLike) else ""
     ready = _ready(source)
     if ready is not None:
         besides = [name for name, value in given.items() if value is not None]
         if besides or crs is not None:
             named = ", ".join([*besides, *(["crs"] if crs is not None else [])])
             raise BoundaryError(f"A layout is ready as it is: leave out {named}.")
-        return replace(ready, name=ready.name or name)
+        return ready
+    first = next((s for s in (source, parcels, streets) if s is not None), None)
     if source is not None:
         given = {**_layers_of(source, given), **{k: v for k, v in given.items() if v is not None}}
     problems: list[str] = []
     asked = asked_crs(crs, problems)
     read = {
-        called: _read(given.get(called), called, kind, layer, columns, problems)
-        for called, kind, layer, columns in (
+        name: _read(given.get(name), name, kind, layer, columns, problems)
+        for name, kind, layer, columns in (
             ("parcels", "polygon", PARCELS.name, PARCEL_COLUMNS),
             ("streets", "line", STREETS.name, STREET_COLUMNS),
             ("land", "polygon", BOUNDARY.name, ()),
@@ -90,25 +104,48 @@ def read_fabric(
     }
     if problems:
         raise BoundaryError(problems)
-    made = build_fabric(
+    fabric = build_fabric(
         read["parcels"], read["streets"], read["land"], library=PYPROJ, asked=asked, params=params
     )
-    return replace(made, name=name)
+    return replace(fabric, name=source_name(first))
+
+
+def source_name(source: Any) -> str:
+    """Return what a fabric is called that is read from a source; empty for a nameless one.
+
+    >>> source_name("towns/mauren.gpkg|layername=plots"), source_name([])
+    ('mauren', '')
+    """
+    if isinstance(source, GeoFabric):
+        return source.measures.fabric.name
+    if isinstance(source, Fabric):
+        return source.name
+    path, _ = split_layer_name(source)
+    return Path(fspath(path)).stem if isinstance(path, str | PathLike) else ""
+
+
+def is_ready(source: Any) -> bool:
+    """Return whether a source is a layout or a fabric, to which no layers can be added."""
+    if isinstance(source, str | PathLike):
+        return _state(source, LAYOUT_STATE) is not None
+    return isinstance(source, Fabric | GeoFabric | MeasuredLayout | Layout)
 
 
 def _ready(source: Any) -> Fabric | None:
     """The fabric that a source is already; None for layers."""
+    if not is_ready(source):
+        return None
     if isinstance(source, Fabric):
         return source
     if isinstance(source, GeoFabric):
         return source.measures.fabric
-    if isinstance(source, MeasuredLayout):
-        return LayoutMeasures(source.layout).of_fabric.fabric
     if isinstance(source, Layout):
-        return LayoutMeasures(source).of_fabric.fabric
-    if isinstance(source, str | PathLike) and _state(source, LAYOUT_STATE) is not None:
-        return LayoutMeasures(read_layout(fspath(source)).layout).of_fabric.fabric
-    return None
+        layout = as_written(source)  # what is measured is the same as in its file
+    elif isinstance(source, MeasuredLayout):
+        layout = as_written(source.layout)
+    else:
+        layout = read_layout(fspath(source)).layout
+    return replace(LayoutMeasures(layout).of_fabric.fabric, name=source_name(source))
 
 
 def _state(source: str | PathLike[str], standard: str) -> str | None:
@@ -125,8 +162,8 @@ def _layers_of(source: Any, given: dict[str, Source | None]) -> dict[str, Source
         path, layer = split_layer_name(source)
         if layer is not None:
             raise BoundaryError(
-                f"{fspath(source)} is one layer: give it as parcels or as streets (parcels=..., "
-                "streets=...)."
+                f"{fspath(source)} is one layer: give it as parcels (--parcel-layer) or as "
+                "streets (--street-layer)."
             )
         return _of_file(fspath(path), given)
     features = read_features(source)
@@ -151,18 +188,27 @@ def _of_names(
 
 
 def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | None]:
+    must_exist(path)
+    if path.lower().endswith(OSM):
+        raise BoundaryError(
+            f"{path} is an extract of OpenStreetMap: compare a layout with it (osm_file, "
+            "--osm-file), or give its streets as a layer."
+        )
     text = _state(path, LAYERS_STATE)
     if text is not None:
         kind = json.loads(text)["kind"]
         names = [str(name) for name, _ in pyogrio.list_layers(path)]
         called = f"{path}, which holds {kind}"
         return _of_names(names, lambda layer: f"{path}|layername={layer}", called, given)
-    if path.lower().endswith(PARQUET) or not Path(path).exists():
+    if path.lower().endswith(PARQUET):
         return _of_one_layer(path, given)
     try:
         layers = [(str(name), kind) for name, kind in pyogrio.list_layers(path)]
-    except DataSourceError:
-        return {"parcels": path}  # reading it says what is wrong
+    except DataSourceError as error:
+        raise BoundaryError(
+            f"{path} cannot be read: it is no layout file, and no other file with layers that GDAL "
+            "knows, or it is damaged."
+        ) from error
     found: dict[str, Source | None] = {}
     problems = []
     for name, layer, geometry in (
@@ -175,8 +221,8 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
         chosen = [layer] if layer in fitting else fitting
         if len(chosen) > 1:
             problems.append(
-                f"{path} has several layers of {geometry}s: {', '.join(chosen)}. Say which are the "
-                f"{name}, as in {name}={path}|layername=NAME."
+                f"{path} has several layers of {geometry}s: {', '.join(chosen)}. Give parcels and "
+                f"streets one by one: {name} (--{_FLAGS[name]}) as {path}|layername=NAME."
             )
         elif chosen:
             found[name] = f"{path}|layername={chosen[0]}"
@@ -188,6 +234,13 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
     if problems:
         raise BoundaryError(problems)
     return found
+
+
+_FLAGS = {"parcels": "parcel-layer", "streets": "street-layer"}
+"""What layers are called on the command line."""
+
+OSM = (".osm", ".osm.bz2", ".osm.gz", ".osm.pbf", ".pbf")
+"""Endings of extracts of OpenStreetMap."""
 
 
 def _nothing(given: dict[str, Source | None]) -> bool:

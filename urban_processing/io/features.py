@@ -149,7 +149,8 @@ def _usable(crs: Any) -> pyproj.CRS | None:
     return crs if known and not crs.name.lower().startswith("undefined") else None
 
 
-def _must_exist(path: str) -> None:
+def must_exist(path: str) -> None:
+    """Raise `BoundaryError` if a path is that of a file that is not there."""
     virtual = "://" in path or path.startswith("/vsi")
     if not virtual and not Path(path).exists():
         raise BoundaryError(f"The file {path} does not exist.")
@@ -162,7 +163,7 @@ def _read_parquet(
 ) -> Features[pyproj.CRS]:
     import geopandas
 
-    _must_exist(path)
+    must_exist(path)
     if layer is not None or where is not None:
         raise BoundaryError(
             "layer and where do not apply to GeoParquet: write the features you mean to a "
@@ -185,7 +186,7 @@ def _read_parquet(
 def _read_file(
     path: str, layer: str | None, where: str | None, kind: str, columns: Sequence[str] | None
 ) -> Features[pyproj.CRS]:
-    _must_exist(path)
+    must_exist(path)
     layer = _choose_layer(path, layer, kind)
     try:
         meta, _, wkb, values = pyogrio.raw.read(

@@ -216,7 +216,9 @@ class GeoLayers:
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(t):,} {each.name}" for each, t in self.made.tables.items())
-        return f"GeoLayers({self.made.kind}: {counts}, {self.made.frame.crs or 'no CRS'})"
+        crs = self.made.frame.crs or "no CRS"
+        crs = crs if len(crs) < 20 else str(self.crs.name)
+        return f"{type(self).__name__}({self.made.kind}: {counts}, {crs})"
 
 
 def table_frame(

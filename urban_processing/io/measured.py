@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -12,57 +14,89 @@ from urban_processing.metrics.measures import FabricMeasures
 from urban_processing.pipelines.measure import ComparedMeasures
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class GeoFabric(GeoLayers):
     """A measured fabric: its layers as frames by their names, its metrics and its report.
 
     Parameters
     ----------
+    made
+        The layers as plain tables.
     measures
-        The measures of a fabric.
+        The measures of the fabric.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> import urban_processing as up
+    >>> found = up.measure(parcels=[shapely.box(0, 0, 30, 40), shapely.box(30, 0, 60, 40)])
+    >>> found.metric("area_mean_m2")
+    1200.0
+    >>> found.parcels.area_m2.tolist()
+    [1200.0, 1200.0]
     """
 
     measures: FabricMeasures
 
-    def __init__(self, measures: FabricMeasures) -> None:
-        super().__init__(fabric_layers(measures))
-        object.__setattr__(self, "measures", measures)
+    @classmethod
+    def of(cls, measures: FabricMeasures) -> GeoFabric:
+        """Return the frames of what was measured."""
+        return cls(fabric_layers(measures), measures)
 
-    def metric(self, name: str) -> float:
-        """Return a metric of the whole; `KeyError` if there is none of that name."""
-        return self.measures.values[name]
+    def metric(self, name: str, *, part: int | None = None) -> float:
+        """Return one metric of the whole, or of a part; NaN where it is not defined.
+
+        `metrics` is the table of all of them.
+
+        Raises
+        ------
+        KeyError
+            If there is none of that name.
+        """
+        found = {m.metric: m.value for m in self.measures.metrics if m.part == part}
+        if name not in found:
+            scope = "" if part is None else f" of part {part}"
+            near = difflib.get_close_matches(name, found, n=3)
+            hint = f" Did you mean {' or '.join(near)}?" if near else ""
+            raise KeyError(f"There is no metric {name!r}{scope}.{hint}")
+        return found[name]
 
     def report(self, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the report as one HTML file; see `urban_processing.report.html`."""
-        from urban_processing.report.html import write_report
+        """Write the report; see `urban_processing.report.html.write`."""
+        from urban_processing.report.html import write
         from urban_processing.report.sides import report_on
 
-        return write_report(report_on([self.measures]), Path(path), overwrite=overwrite)
+        return write(report_on([self.measures]), Path(path), overwrite=overwrite)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class GeoComparison(GeoLayers):
     """A comparison: the table of metrics and the distances of distributions as frames.
 
     Parameters
     ----------
+    made
+        The layers as plain tables.
     compared
         The sides that were measured, and the statistics.
     """
 
     compared: ComparedMeasures
 
-    def __init__(self, compared: ComparedMeasures) -> None:
-        super().__init__(comparison_set(compared.comparison, history=compared.history))
-        object.__setattr__(self, "compared", compared)
+    @classmethod
+    def of(cls, compared: ComparedMeasures) -> GeoComparison:
+        """Return the frames of what was compared."""
+        return cls(comparison_set(compared.comparison, history=compared.history), compared)
 
     @property
     def sides(self) -> dict[str, GeoFabric]:
         """The sides by their names."""
-        return {known.fabric.name: GeoFabric(known) for known in self.compared.measured}
+        return {known.fabric.name: GeoFabric.of(known) for known in self.compared.measured}
 
     def report(self, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the report as one HTML file; see `urban_processing.report.html`."""
-        from urban_processing.report.html import write_report
+        """Write the report; see `urban_processing.report.html.write`."""
+        from urban_processing.report.html import write
         from urban_processing.report.sides import report_on
 
         made = report_on(self.compared.measured, self.compared.comparison)
-        return write_report(made, Path(path), overwrite=overwrite)
+        return write(made, Path(path), overwrite=overwrite)

@@ -61,6 +61,8 @@ def layer_style(layer: Layer, *, places_only: bool = False) -> str | None:
     rules = list(_RULES[name]())
     if layer == SUBDIVIDED_PARCELS:  # over what the other rules draw of an irregular patio
         rules.append(_Rule("Patio", f"\"land_use\" = '{PATIO_USE}'", [_fill(_GREEN)], "fill"))
+    if name == "streets" and "fixed_id" not in layer.column_names:
+        rules = _measured_streets()
     if name == "parcels" and "change" in layer.column_names:
         rules = _changed()
     if name == "parcels" and set(OBSERVED_PARCELS.column_names) <= set(layer.column_names):
@@ -223,6 +225,16 @@ def _streets() -> list[_Rule]:
             own = f"\"class\" = '{name}' AND {given}NULL"
             rules.append(_Rule(label, own, _street(color, 0.6), "line"))
     return rules
+
+
+def _measured_streets() -> list[_Rule]:
+    """Streets of any origin: by the classes of layouts, all others alike."""
+    own = [
+        _Rule(label, f"\"class\" = '{name}'", _street(color, 0.6), "line")
+        for name, (label, color) in _STREETS.items()
+        if name != "fixed"
+    ]
+    return [*own, _Rule("Street", "ELSE", _street(_STREET, 0.6), "line")]
 
 
 def _junctions() -> list[_Rule]:

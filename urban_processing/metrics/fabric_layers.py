@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 
@@ -22,7 +24,14 @@ from urban_processing.metrics.tables import (
     street_columns,
 )
 from urban_processing.schema import BOUNDARY, ISSUES, JUNCTIONS, METRICS, Layer
-from urban_processing.tables import LayerSet, Table, issue_table, make_table, to_map
+from urban_processing.tables import (
+    LayerSet,
+    Table,
+    issue_table,
+    issues_in_words,
+    make_table,
+    to_map,
+)
 
 
 def fabric_layers(known: FabricMeasures) -> LayerSet:
@@ -44,7 +53,7 @@ def fabric_layers(known: FabricMeasures) -> LayerSet:
         tables[STREET_LAND] = _areas(
             STREET_LAND, fabric, fabric.right_of_way, fabric.right_of_way_part
         )
-    tables[ISSUES] = issue_table(fabric.issues, frame)
+    tables[ISSUES] = issue_table(fabric.all_issues, frame)
     tables[METRICS] = metric_table(known.metrics)
     return LayerSet(
         kind=MEASURED_KIND,
@@ -110,17 +119,25 @@ def _summary(known: FabricMeasures) -> list[tuple[str, str]]:
                 "parcels",
                 f"{v['parcels']:,.0f} of {v['area_mean_m2']:,.0f} m² in the mean, "
                 f"{v['quads_pct']:.1f} % with four sides, mean irregularity "
-                f"{v['irregularity_mean']:.3f}, {v['unreached']:,.0f} without a street",
+                f"{v['irregularity_mean']:.3f}{_unreached(v['unreached'])}",
             )
         )
     rows.append(("blocks", f"{v['blocks']:,.0f}"))
     rows.append(
         (
             "streets",
-            f"{v['street_length_m'] / 1000:,.1f} km, {v['intersections']:,.0f} intersections, "
-            f"{v['dead_ends']:,.0f} dead ends (besides the rim)",
+            f"{v['street_length_m'] / 1000:,.1f} km, {_count(v['intersections'], 'intersection')}, "
+            f"{_count(v['dead_ends'], 'dead end')} (besides the rim)",
         )
     )
-    if fabric.issues:
-        rows.append(("issues", f"{len(fabric.issues)} (see the layer issues)"))
+    if fabric.all_issues:
+        rows.append(("issues", f"{issues_in_words(fabric.all_issues)} (see the layer issues)"))
     return rows
+
+
+def _unreached(parcels: float) -> str:
+    return "" if math.isnan(parcels) else f", {parcels:,.0f} without a street"
+
+
+def _count(number: float, what: str) -> str:
+    return f"{number:,.0f} {what}" + ("" if number == 1 else "s")

@@ -18,6 +18,8 @@ from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
 from urban_processing.version import __version__
 
+_MEASURE = "measure"
+
 
 def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) -> FabricMeasures:
     """Work out every metric of a fabric; its history tells that it was measured.
@@ -32,20 +34,23 @@ def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) 
         Told how far the work is; may stop it.
     """
     started = time.perf_counter()
-    known = FabricMeasures(fabric)
+    # measuring changes nothing: an earlier one has nothing to tell
+    earlier = tuple(made for made in fabric.history if made.algorithm != _MEASURE)
+    known = FabricMeasures(replace(fabric, history=earlier))
     progress.update(0.1, "Parcels")
     _ = known.parcels, known.block_sides
     progress.update(0.5, "Ways along streets")
     _ = known.metrics
+    own = {field.name for field in MeasureParams.fields()}
     step = Step(
-        algorithm="measure",
-        parameters=params.as_dict(),
+        algorithm=_MEASURE,
+        parameters={name: value for name, value in params.as_dict().items() if name in own},
         seed=0,
         version=__version__,
         input_sha256=fabric.input_sha256,
         seconds=time.perf_counter() - started,
     )
-    measured = FabricMeasures(replace(fabric, history=(*fabric.history, step)))
+    measured = FabricMeasures(replace(fabric, history=(*earlier, step)))
     # what is worked out needs not be worked out again
     measured.__dict__.update({k: v for k, v in known.__dict__.items() if k != "fabric"})
     progress.update(1.0, "Measured")
@@ -82,20 +87,15 @@ def compare_fabrics(
         If there are fewer than two, or the reference is none of them.
     """
     started = time.perf_counter()
-    fabrics = _named(compared.all)
-    if len(fabrics) < 2:
-        raise ParameterError(
-            "A comparison needs two sides: give two files, or one and what is there: "
-            "OpenStreetMap, or layers of parcels and streets."
-        )
-    names = [fabric.name for fabric in fabrics]
+    fabrics = compared.all
+    names = side_names([fabric.name for fabric in fabrics])
+    problems = side_problems(names, "", params.reference)
+    if problems:
+        raise ParameterError(problems)
+    fabrics = tuple(replace(f, name=name) for f, name in zip(fabrics, names, strict=True))
     reference = params.reference
     if reference is None:
         reference = names[0] if compared.real is None else names[-1]
-    if reference not in names:
-        raise ParameterError(
-            f"There is no side called {reference!r} to compare with: there are {', '.join(names)}."
-        )
     share = 0.8 / len(fabrics)
     measured = [
         measure(fabric, params, progress.slice(k * share, (k + 1) * share))
@@ -123,7 +123,37 @@ def compare_fabrics(
     return ComparedMeasures(tuple(measured), comparison, (step,))
 
 
-def _named(fabrics: Sequence[Fabric]) -> list[Fabric]:
-    """The fabrics under names that differ."""
-    names = unique_names([fabric.name or "layout" for fabric in fabrics])
-    return [replace(fabric, name=name) for fabric, name in zip(fabrics, names, strict=True)]
+def side_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return what the sides of a comparison are called: all differently.
+
+    >>> side_names(["", "town", ""])
+    ('layout', 'town', 'layout (2)')
+    """
+    return unique_names([name or "layout" for name in names])
+
+
+def side_problems(made: Sequence[str], real: str, reference: str | None) -> list[str]:
+    """Return one sentence for each reason why sides cannot be compared.
+
+    Parameters
+    ----------
+    made
+        Names of the sides in their order, empty for none.
+    real
+        Name of what is there; empty where that is no side.
+    reference
+        Name of the side that the others are to be set against, if one was given.
+    """
+    names = side_names([*made, *([real] if real else [])])
+    problems = []
+    if len(names) < 2:
+        problems.append(
+            "A comparison needs two sides: give two files, or one and what is there: "
+            "OpenStreetMap, or layers of parcels and streets."
+        )
+    if reference is not None and reference not in names:
+        problems.append(
+            f"There is no side called {reference!r} to compare with: the sides are "
+            f"{', '.join(names) or '(none)'}."
+        )
+    return problems

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 
 from urban_processing.calibration.layers import CALIBRATION_KIND
 from urban_processing.errors import ParameterError
+from urban_processing.fabric.layers import MEASURED_KIND
 from urban_processing.metrics.subdivisions import PATIO_USE
 from urban_processing.report.figure import (
     checked,
@@ -32,12 +33,16 @@ from urban_processing.report.legend import (
     root_figure,
     swatch,
 )
+from urban_processing.report.map import draw_streets
 from urban_processing.report.palette import (
     BLOCK,
+    CASING,
+    FAINT,
     INK,
     OUTLINE,
     PARCEL,
     PATIO,
+    STREET,
     SURFACE,
     VALUE_RAMP,
     Scale,
@@ -63,7 +68,7 @@ def plot_layers(
     ax: Axes | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw a map of blocks, and of the parcels in them.
+    """Draw a map of blocks, and of the parcels in them; of what was measured, streets too.
 
     Parcels are coloured as in `urban_processing.report.map.plot_layout`, those of a calibration
     by their areas.
@@ -96,7 +101,7 @@ def plot_layers(
         ax = new_axes(extent, title=title, longer=_longer_side(tables))
     frame_land(ax, extent)
     scale = scale_of(ax, tables.get("parcels", ground)["area_m2"])
-    _draw(ax, tables, scale)
+    _draw(ax, tables, scale, streets=made.kind == MEASURED_KIND)
     if made.kind == CALIBRATION_KIND and "parcels" in tables:
         _colour_by_area(ax, tables["parcels"], scale)
     figure = root_figure(ax)
@@ -111,12 +116,15 @@ def _longer_side(tables: dict[str, Table]) -> float:
     return float(np.clip(0.2 * n**0.5 + 5.5, 7.0, 22.0))
 
 
-def _draw(ax: Axes, tables: dict[str, Table], scale: Scale) -> None:
+def _draw(ax: Axes, tables: dict[str, Table], scale: Scale, *, streets: bool) -> None:
+    """Draw the layers; `streets` above all others, right-of-way over what parcels have of it."""
     entries: list[Any] = []
     if "right_of_way" in tables:
-        _areas(ax, tables["right_of_way"], SURFACE, zorder=1.0)
+        _areas(
+            ax, tables["right_of_way"], SURFACE, zorder=_PARCEL_ORDER + (0.1 if streets else -0.2)
+        )
         entries.append(swatch(SURFACE, "Right-of-way"))
-    if "blocks" in tables:
+    if "blocks" in tables and not (streets and "parcels" in tables):
         fill = "none" if "parcels" in tables else BLOCK
         _areas(ax, tables["blocks"], fill, edge=INK, width=2.0 * scale.outline, zorder=1.5)
         if "parcels" not in tables:
@@ -128,6 +136,13 @@ def _draw(ax: Axes, tables: dict[str, Table], scale: Scale) -> None:
             ax, parcels, _colours(parcels), edge=OUTLINE, width=scale.outline, zorder=_PARCEL_ORDER
         )
         entries += _parcel_entries(parcels)
+    if streets and "boundary" in tables:
+        _areas(ax, tables["boundary"], "none", edge=FAINT, width=1.8 * scale.outline, zorder=1.5)
+    if streets and "streets" in tables:
+        draw_streets(ax, tables["streets"], tables["junctions"], scale, (STREET, CASING))
+        entries.append(
+            swatch(STREET, f"{tables['streets']['length_m'].sum() / 1000:,.1f} km of streets")
+        )
     draw_scale_bar(ax, scale)
     draw_legend(ax, entries, scale)
 

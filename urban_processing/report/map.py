@@ -137,7 +137,7 @@ def _draw(ax: Axes, tables: dict[str, Table], colour_by: str | None) -> None:
         _draw_obstacles(ax, tables["obstacles"])
     _draw_rim(ax, tables["boundary"], scale)
     colours = (STREET, CASING) if colour_by is None else (PLAIN_STREET, PLAIN_CASING)
-    _draw_streets(ax, tables["streets"], tables["junctions"], scale, colours)
+    draw_streets(ax, tables["streets"], tables["junctions"], scale, colours)
     draw_scale_bar(ax, scale)
     draw_legend(ax, legend_entries(tables, colour_by, colours), scale)
     if colour_by is not None:
@@ -207,17 +207,28 @@ def _value_range(values: npt.NDArray[Any]) -> Normalize:
     return Normalize(low, high if high > low else low + 1.0)
 
 
-def _draw_streets(
+def _known_widths(width: npt.NDArray[np.float64], otherwise: float) -> npt.NDArray[np.float64]:
+    known = width > 0
+    usual = float(np.median(width[known])) if known.any() else otherwise
+    return np.where(known, width, usual)
+
+
+def draw_streets(
     ax: Axes, streets: Table, junctions: Table, scale: Scale, colours: tuple[str, str]
 ) -> None:
-    """All casings below all fills, so that crossings are open."""
+    """Draw streets, all casings below all fills, so that crossings are open.
+
+    Those of unknown width are as wide as the others.
+    """
     lines = [shapely.get_coordinates(line) for line in streets.shapes]
     if not lines:
         return
-    width = scale.street(streets["width_m"])
+    width = scale.street(_known_widths(streets["width_m"], 0.15 * scale.side))
     ends = shapely.get_coordinates(junctions.shapes[junctions["kind"] == "end"])
     entries = shapely.get_coordinates(junctions.shapes[junctions["kind"] == "entry"])
-    given = ~np.isnan(streets["fixed_id"])
+    given = np.zeros(len(lines), dtype=bool)
+    if "fixed_id" in streets.columns:
+        given = ~np.isnan(streets["fixed_id"])
     for fill, margin, zorder in ((False, 2 * scale.casing, 2), (True, 0.0, 3)):
         colour = colours[0 if fill else 1]
         fixed = (FIXED_STREET if fill else FIXED_CASING) if colours[0] == STREET else colour

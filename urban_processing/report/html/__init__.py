@@ -5,6 +5,7 @@ from urban_processing.report.html.model import Report, ReportSide, report_side
 from urban_processing.report.html.page import report_html
 from urban_processing.report.html.writing import (
     report_problems,
+    write,
     write_csv,
     write_json,
     write_report,
@@ -18,6 +19,7 @@ __all__ = [
     "report_json",
     "report_problems",
     "report_side",
+    "write",
     "write_csv",
     "write_json",
     "write_report",

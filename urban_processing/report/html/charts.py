@@ -22,7 +22,7 @@ DASHES = ("", "7 3", "2 2.5", "9 3 2 3", "4 4", "1 3")
 """Sides are told apart by dashes too."""
 
 WIDTH, HEIGHT = 340, 190
-LEFT, RIGHT, TOP, BOTTOM = 40, 10, 10, 24
+LEFT, RIGHT, TOP, BOTTOM = 50, 10, 10, 24
 ROSE = 240
 TICKS = 5
 LETTER = 8.0

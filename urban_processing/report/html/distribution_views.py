@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from urban_processing.metrics.distributions import DistributionSpec, Sample
 from urban_processing.metrics.histograms import Histogram
 from urban_processing.report.html.charts import Chart, chart
-from urban_processing.report.html.digits import decimals_for, number, with_unit
+from urban_processing.report.html.digits import decimals_for, number
 from urban_processing.report.html.model import Report
 from urban_processing.report.html.sentences import (
     mean,
@@ -16,6 +15,7 @@ from urban_processing.report.html.sentences import (
     of_distribution,
     quantile,
 )
+from urban_processing.report.html.summary import interval
 
 QUANTILES = (0.1, 0.5, 0.9)
 """Quantiles that the table of a distribution shows."""
@@ -23,8 +23,9 @@ QUANTILES = (0.1, 0.5, 0.9)
 
 @dataclass(frozen=True)
 class SideLine:
-    """The values of one side: how many, and their mean and quantiles as text."""
+    """The values of side `number`: how many, and their mean and quantiles as text."""
 
+    number: int
     side: str
     count: str
     figures: tuple[str, ...]
@@ -34,7 +35,6 @@ class SideLine:
 class DistanceLine:
     """How far a side is from the reference: in words, and both distances with intervals."""
 
-    side: str
     sentence: str
     wasserstein: str
     ks: str
@@ -42,7 +42,7 @@ class DistanceLine:
 
 @dataclass(frozen=True)
 class DistributionView:
-    """One distribution of all sides."""
+    """One distribution of all sides; `alone` is the only one of several that has values."""
 
     spec: DistributionSpec
     chart: Chart
@@ -50,6 +50,7 @@ class DistributionView:
     tail: str
     sides: tuple[SideLine, ...]
     distances: tuple[DistanceLine, ...]
+    alone: str
 
 
 def distribution_views(report: Report, names: tuple[str, ...]) -> list[DistributionView]:
@@ -63,7 +64,8 @@ def _view(report: Report, h: Histogram, names: tuple[str, ...]) -> DistributionV
     said = [of_distribution(h, k, sample) for k, sample in enumerate(samples)]
     if len(names) > 1:
         said = [f"{name}: {text}" for name, text in zip(names, said, strict=True)]
-    known = [] if report.comparison is None else report.comparison.distances
+    known = () if report.comparison is None else report.comparison.distances
+    there = [k for k, sample in enumerate(samples) if len(sample)]
     shown = dict(zip(report.names, names, strict=True))
     of = dict(zip(report.names, samples, strict=True))
     return DistributionView(
@@ -71,22 +73,22 @@ def _view(report: Report, h: Histogram, names: tuple[str, ...]) -> DistributionV
         chart(h),
         " ".join(said),
         _tail(h),
-        _side_lines(spec, samples, names),
+        _side_lines(spec, [samples[k] for k in there], [(k, names[k]) for k in there]),
         tuple(
             DistanceLine(
-                shown[d.side],
                 of_distance(d, of[d.side], of[d.reference], (shown[d.side], shown[d.reference])),
                 interval(d.wasserstein, d.wasserstein_low, d.wasserstein_high, spec.unit),
                 interval(d.ks, d.ks_low, d.ks_high, ""),
             )
             for d in known
-            if d.distribution == spec
+            if d.distribution == spec and d.n_side and d.n_reference
         ),
+        names[there[0]] if len(there) == 1 < len(names) else "",
     )
 
 
 def _side_lines(
-    spec: DistributionSpec, samples: list[Sample], names: tuple[str, ...]
+    spec: DistributionSpec, samples: list[Sample], sides: list[tuple[int, str]]
 ) -> tuple[SideLine, ...]:
     """Figures of all sides with the same decimals; those of directions have no order."""
     figures = [
@@ -94,8 +96,8 @@ def _side_lines(
     ]
     decimals = decimals_for([value for each in figures for value in each])
     return tuple(
-        SideLine(name, f"{len(sample):,}", tuple(number(value, decimals) for value in each))
-        for name, sample, each in zip(names, samples, figures, strict=True)
+        SideLine(k, name, f"{len(sample):,}", tuple(number(value, decimals) for value in each))
+        for (k, name), sample, each in zip(sides, samples, figures, strict=True)
     )
 
 
@@ -104,19 +106,8 @@ def _tail(h: Histogram) -> str:
     held = [name for name, there in (("first", h.below), ("last", h.above)) if there]
     if not held:
         return ""
-    return f"The {' and the '.join(held)} bar hold{'s' if len(held) == 1 else ''} all beyond."
-
-
-def interval(value: float, low: float, high: float, unit: str) -> str:
-    """Return a value and its confidence interval: ``41 m² (30 to 52)``; nothing if unknown.
-
-    >>> interval(0.1234, 0.1, 0.2, ""), interval(float("nan"), 0.0, 0.0, "m")
-    ('0.123 (0.100 to 0.200)', '')
-    """
-    if math.isnan(value):
-        return ""
-    decimals = decimals_for([value, high])
-    shown = with_unit(value, unit, decimals)
-    if math.isnan(low):
-        return shown
-    return f"{shown} ({number(low, decimals)} to {number(high, decimals)})"
+    one = len(held) == 1
+    return (
+        f"The {' and the '.join(held)} bar also hold{'s' if one else ''} the values beyond "
+        f"{'it' if one else 'them'}."
+    )

@@ -63,11 +63,12 @@ _LABELS = {
 """Names that their words do not tell."""
 
 _GROUP_OF = {
-    "Land and use": r"perimeter_m|area_m2|min_area_m2|land_use_.*|right_of_way_.*",
+    "Land and use": r"perimeter_m|area_m2|land_use_.*|right_of_way_.*",
     "Blocks": r"blocks.*|block_.*|small_blocks_pct",
     "Ways": r"circuity|meshedness|.*_detour|.*_distance_.*",
-    "Streets": r"streets?(_.*)?|junction.*|intersections.*|dead_ends.*|segment.*|orientation_.*",
-    "Making": r"seconds|deepest_level",
+    "Streets": r"streets?(_.*)?|junction.*|intersections.*|dead_ends.*|segment.*|orientation_.*|"
+    r"network_pieces",
+    "Making": r"seconds|deepest_level|min_area_m2",
 }
 """Names of the metrics of each group; the rest is of parcels."""
 

@@ -18,6 +18,7 @@ from urban_processing.report.html.svg import (
     line_paths,
     stage_of,
 )
+from urban_processing.report.html.text import isolate, listed
 from urban_processing.report.html.themes import HATCHED, IntArray, Theme, themes
 from urban_processing.report.palette import OUTLINE, PLAIN_CASING, PLAIN_STREET, SURFACE, Scale
 from urban_processing.tables import Table
@@ -61,12 +62,13 @@ class LegendRow:
 
 @dataclass(frozen=True)
 class MapGroup:
-    """The maps of one theme, with their legend."""
+    """The maps of one theme, with their legend; `counts` says what the legend counts."""
 
     name: str
     title: str
     note: str
     of_lines: bool
+    counts: str
     panels: tuple[Panel, ...]
     legend: tuple[LegendRow, ...]
 
@@ -115,7 +117,9 @@ def map_sheet(report: Report) -> MapSheet | None:
         _Drawing(k, side, stage.canvas(extent or known[0]), size)
         for k, (side, extent) in enumerate(zip(sides, extents, strict=True))
     ]
-    groups = tuple(_group(theme, drawings, report.names) for theme in chosen)
+    groups = [_group(theme, drawings, report.names) for theme in chosen]
+    # what all sides have comes first
+    groups.sort(key=lambda group: -len(group.panels))
     bar = _round_down(BAR_SHARE * stage.width_m)
     width, height = round(stage.width_m * stage.factor), round(stage.height_m * stage.factor)
     return MapSheet(
@@ -126,7 +130,7 @@ def map_sheet(report: Report) -> MapSheet | None:
         bar_percent=round(100 * bar / stage.width_m, 2),
         hatch=round(max(width, height) / HATCH_LINES, 1),
         shared="".join(drawing.shared for drawing in drawings),
-        groups=groups,
+        groups=tuple(groups),
     )
 
 
@@ -208,10 +212,6 @@ class _Drawing:
 
     def shapes(self, theme: Theme) -> str:
         """The map of a theme as SVG."""
-        if theme.layer not in self.tables:
-            p = self.prefix
-            ground = f'<use href="#{p}-boundary" fill="{SURFACE}"/>'
-            return f'{ground}<use href="#{p}-casing"/><use href="#{p}-street"/>'
         of = theme.class_of(self.tables[theme.layer])
         drawn = self._of_streets if theme.layer == "streets" else self._of_areas
         return drawn(theme, of)
@@ -243,32 +243,36 @@ class _Drawing:
         )
         return (
             f'<use href="#{self.prefix}-boundary" fill="{SURFACE}"/>'
-            f'<path fill="#faf8f2" d="{shown}"/><g {_LINE}>{lines}</g>'
+            f'<path fill="#faf8f2" d="{shown}"/>'
+            f'<use href="#{self.prefix}-boundary" {_LINE} stroke="{PLAIN_CASING}" '
+            f'stroke-width="{2 * self.outline:g}"/><g {_LINE}>{lines}</g>'
         )
 
 
 def _group(theme: Theme, drawings: Sequence[_Drawing], names: Sequence[str]) -> MapGroup:
     panels = []
     amounts = []
+    missing = []
     for drawing, name in zip(drawings, names, strict=True):
         table = drawing.tables.get(theme.layer)
-        missing = f"{theme.layer.capitalize()} are not known."
-        sentence = missing if table is None else theme.sentence(table)
-        panels.append(Panel(name, sentence, drawing.shapes(theme)))
+        if table is None or not theme.shows(table):
+            missing.append(isolate(name))
+            continue
+        panels.append(Panel(name, theme.sentence(table), drawing.shapes(theme)))
         amounts.append(_amounts(theme, table))
     rows = [
         LegendRow(c.fill, c.label, tuple(texts[k] for texts in amounts))
         for k, c in enumerate(theme.classes)
-        if any(texts[k] not in ("", "0") for texts in amounts) or c.fill != HATCHED
+        if any(texts[k] != "0" for texts in amounts) or c.fill != HATCHED
     ]
     of_lines = theme.layer == "streets"
-    return MapGroup(theme.name, theme.title, theme.note, of_lines, tuple(panels), tuple(rows))
+    note = f"{theme.note} Not known of {listed(missing)}.".strip() if missing else theme.note
+    counts = "Length" if of_lines else theme.layer.capitalize()
+    return MapGroup(theme.name, theme.title, note, of_lines, counts, tuple(panels), tuple(rows))
 
 
-def _amounts(theme: Theme, table: Table | None) -> list[str]:
-    """How much of a side is in each class, as text; empty where the layer is not known."""
-    if table is None:
-        return [""] * len(theme.classes)
+def _amounts(theme: Theme, table: Table) -> list[str]:
+    """How much of a side is in each class, as text."""
     weight: FloatArray = np.ones(len(table))
     if theme.layer == "streets":
         weight = np.asarray(table["length_m"], dtype=np.float64) / 1000

@@ -15,6 +15,7 @@ from urban_processing.metrics.histograms import Histogram, histogram
 from urban_processing.metrics.measures import FabricMeasures
 from urban_processing.metrics.registry import INTERIOR, METRICS, MetricSpec
 from urban_processing.provenance import Step, timeless
+from urban_processing.report.html.text import listed
 from urban_processing.tables import LayerSet, Table
 
 
@@ -120,7 +121,7 @@ class Report:
     @property
     def heading(self) -> str:
         """The title, or one made of the names."""
-        return self.title or " and ".join(self.names)
+        return self.title or listed(self.names)
 
     @property
     def reference(self) -> int | None:

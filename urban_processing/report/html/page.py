@@ -7,18 +7,18 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from urban_processing.errors import DependencyError
-from urban_processing.metrics.comparison_words import words
 from urban_processing.metrics.distributions import DISTRIBUTIONS
 from urban_processing.metrics.registry import METRICS
 from urban_processing.report.html.charts import line_of
 from urban_processing.report.html.distribution_views import distribution_views
 from urban_processing.report.html.labels import label
 from urban_processing.report.html.maps import map_sheet
-from urban_processing.report.html.metric_rows import metric_groups, part_tables
+from urban_processing.report.html.metric_rows import metric_groups, one_sided, part_tables
 from urban_processing.report.html.model import Report
 from urban_processing.report.html.records import check_lines, issue_list, step_lines
 from urban_processing.report.html.sentences import BETTER, FIGURES, first_figures
-from urban_processing.report.html.text import isolate, shown
+from urban_processing.report.html.summary import verdict
+from urban_processing.report.html.text import isolate, listed, shown
 from urban_processing.version import __version__
 
 if TYPE_CHECKING:
@@ -72,22 +72,27 @@ def _context(report: Report) -> dict[str, Any]:
     n = len(sides)
     figures = [dict(first_figures(side.values)) for side in report.sides]
     comparison = report.comparison
+    others = [name for k, name in enumerate(names) if k != report.reference]
+    # what all sides have comes first
+    known = sorted(FIGURES, key=lambda f: sum(f.about not in each for each in figures))
     return {
         "style": _file(STYLE),
         "title": isolate(report.heading),
         "names": names,
         "reference": report.reference,
-        "others": [name for k, name in enumerate(names) if k != report.reference],
+        "others": others,
+        "listed": listed(others),
         "lines": [line_of(k, n) for k in range(n)],
         "figures": [
             (f.about, [each.get(f.about, "") for each in figures])
-            for f in FIGURES
+            for f in known
             if any(f.about in each for each in figures)
         ],
-        "verdict": () if comparison is None else words(comparison),
+        "verdict": () if comparison is None else verdict(comparison, names),
         "confidence": None if comparison is None else comparison.resampling.confidence,
         "sheet": map_sheet(report),
         "metrics": metric_groups(report),
+        "one_sided": one_sided(report),
         "parts": part_tables(report),
         "distributions": distribution_views(report, names),
         "certificates": [

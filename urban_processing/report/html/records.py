@@ -12,6 +12,8 @@ from urban_processing.report.html.digits import number
 from urban_processing.report.html.sentences import PROMISES
 from urban_processing.tables import Table
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 MOST = 50
 """Rows and numbers of parcels that are shown; of the others the page says how many there are."""
 
@@ -72,12 +74,15 @@ def _check_line(check: Check) -> CheckLine:
 
 
 def _exact(value: float) -> str:
-    """Small shares keep their power of ten.
+    r"""Small shares keep their power of ten.
 
-    >>> _exact(1e-8), _exact(0.0), _exact(1234.0)
-    ('1e-08', '0', '1,234')
+    >>> [_exact(value).replace("\u00a0", " ") for value in (1e-8, 1.24e-16, 0.0, 1234.0)]
+    ['1 × 10⁻⁸', '1.24 × 10⁻¹⁶', '0', '1,234']
     """
-    return f"{value:.3g}" if 0.0 < abs(value) < 1e-3 else number(value)
+    if not 0.0 < abs(value) < 1e-3:
+        return number(value)
+    digits, power = f"{value:.2e}".split("e")
+    return f"{float(digits):g}\u00a0×\u00a010{str(int(power)).translate(_RAISED)}"
 
 
 def issue_list(side: str, issues: Table | None) -> IssueList:

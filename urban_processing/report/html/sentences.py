@@ -16,6 +16,7 @@ from urban_processing.report.html.digits import (
     counted,
     decimals_for,
     number,
+    share,
     with_unit,
 )
 from urban_processing.report.html.svg import FloatArray
@@ -37,6 +38,9 @@ PROMISES = {
 
 Values = Mapping[str, float]
 
+USES = ("parcels", "streets", "parks", "other")
+"""Uses of land, of which metrics tell the shares."""
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -50,7 +54,8 @@ class Figure:
 def _area(v: Values) -> str:
     area = v["area_m2"]
     text = with_unit(area / 1e6, "km²", 2) if area >= 1e6 else with_unit(area / 1e4, "ha", 2)
-    return f"{text}, with a boundary of {with_unit(v['perimeter_m'] / 1000, 'km', 1)}"
+    boundary = v.get("perimeter_m", math.nan) / 1000
+    return text if math.isnan(boundary) else f"{text}, with a boundary of {number(boundary, 1)} km"
 
 
 def _unreached(v: Values) -> str:
@@ -58,9 +63,26 @@ def _unreached(v: Values) -> str:
     return "a street reaches every parcel" if n == 0 else f"{n:,} without a street"
 
 
+def _uses(v: Values) -> str:
+    """Shares of the land that are known, the rest of the land only where there is some."""
+    shares = [(use, v.get(f"land_use_{use}_pct", math.nan)) for use in USES]
+    shown = [(use, s) for use, s in shares if math.isfinite(s) and (use != "other" or s >= 0.5)]
+    return ", ".join(f"{with_unit(value, '%', 0)} {use}" for use, value in shown)
+
+
 def _of(values: Values, name: str, unit: str = "", decimals: int | None = None) -> str:
     value = values.get(name, math.nan)
     return "not known" if math.isnan(value) else with_unit(value, unit, decimals)
+
+
+def _blocks(v: Values) -> str:
+    n = number(v["blocks"])
+    if not math.isfinite(v.get("block_length_median_m", math.nan)):
+        return n if v["blocks"] else "none"
+    return (
+        f"{n}, half of them longer than {_of(v, 'block_length_median_m', 'm', 0)}, the longest "
+        f"{_of(v, 'block_length_max_m', 'm', 0)}"
+    )
 
 
 FIGURES: tuple[Figure, ...] = (
@@ -68,49 +90,44 @@ FIGURES: tuple[Figure, ...] = (
     Figure(
         "Use of the land",
         "land_use_streets_pct",
-        lambda v: (
-            f"{_of(v, 'land_use_parcels_pct', '%', 0)} parcels, "
-            f"{_of(v, 'land_use_streets_pct', '%', 0)} streets, "
-            f"{_of(v, 'land_use_parks_pct', '%', 0)} parks"
-        ),
+        _uses,
     ),
     Figure(
         "Parcels",
         "parcels",
-        lambda v: f"{number(v['parcels'])}, {_of(v, 'area_mean_m2', 'm²', 0)} each in the mean",
+        lambda v: f"{number(v['parcels'])}, {_of(v, 'area_mean_m2', 'm²', 0)} each on average",
     ),
     Figure(
         "Shape",
         "irregularity_mean",
         lambda v: (
             f"{_of(v, 'quads_pct', '%', 0)} have four sides; mean irregularity "
-            f"{_of(v, 'irregularity_mean', '', 3)}"
+            f"{_of(v, 'irregularity_mean', '', 3)} (0 is a square)"
         ),
     ),
     Figure(
         "Undesirable parcels",
         "undesirable",
-        lambda v: f"{number(v['undesirable'])}, {_of(v, 'undesirable_pct', '%', 0)} of all",
+        lambda v: f"{number(v['undesirable'])} ({share(v['undesirable'], v['parcels'])} of all)",
     ),
     Figure(
         "Access",
         "unreached",
-        lambda v: f"{_unreached(v)}; {_of(v, 'frontage_mean_m', 'm', 1)} of frontage in the mean",
+        lambda v: f"{_unreached(v)}; {_of(v, 'frontage_mean_m', 'm', 1)} of frontage on average",
     ),
     Figure(
         "Blocks",
         "blocks",
-        lambda v: (
-            f"{number(v['blocks'])}, {_of(v, 'block_length_median_m', 'm', 0)} long in the median, "
-            f"{_of(v, 'block_length_max_m', 'm', 0)} at most"
-        ),
+        _blocks,
     ),
     Figure(
         "Streets",
         "street_length_m",
         lambda v: (
-            f"{with_unit(v['street_length_m'] / 1000, 'km', 1)} besides the rim, "
+            f"{with_unit(v['street_length_m'] / 1000, 'km', 1)} inside the land, "
             f"{_of(v, 'street_km_per_km2', 'km', 1)} for each km²"
+            if v["street_length_m"]
+            else "none inside the land"
         ),
     ),
     Figure(
@@ -143,15 +160,15 @@ def mean(sample: Sample) -> float:
     return float(np.average(sample.values, weights=sample.weights)) if len(sample) else math.nan
 
 
-def quantile(sample: Sample, share: float) -> float:
-    """Return the value that a share of all is below, weighted where there are weights."""
+def quantile(sample: Sample, part: float) -> float:
+    """Return the value that a part of all, 0 to 1, is below, weighted where there are weights."""
     if not len(sample):
         return math.nan
     if sample.weights is None:
-        return float(np.quantile(sample.values, share))
+        return float(np.quantile(sample.values, part))
     order = np.argsort(sample.values, kind="stable")
     below: FloatArray = np.cumsum(sample.weights[order])
-    place = int(np.searchsorted(below, share * below[-1]))
+    place = int(np.searchsorted(below, part * below[-1]))
     return float(sample.values[order[min(place, len(order) - 1)]])
 
 
@@ -189,8 +206,6 @@ def of_distance(
     """
     spec = d.distribution
     first, second = names
-    if not len(side) or not len(reference):
-        return f"{second if len(side) else first} has no values to compare."
     chance = "by more than chance" if d.more_than_noise else "no more than by chance"
     if spec.circular:
         return f"Directions of {first} and {second} differ {chance}."
@@ -202,4 +217,4 @@ def of_distance(
     else:
         size = with_unit(abs(change), spec.unit, decimals)
         moved = f"{size} {'larger' if change > 0 else 'smaller'} in {first} than in {second}"
-    return f"In the mean {moved}; the distributions differ {chance}."
+    return f"On average {moved}; the distributions differ {chance}."

@@ -28,11 +28,23 @@ COOL = ("#f7f3dc", "#d6e8c4", "#9fd0bd", "#63b3bd", "#3787ad", "#2f5f97", "#2a3f
 PALE, BAD = "#f3eee2", "#b3401f"
 PLAIN, PARK, PATIO, REMNANT = "#f6f1e1", "#8fc27e", "#d5e3c6", "#6b6459"
 USES = ("#e3a857", "#7fa8d1", "#c58bbf", "#b9b3a6", "#4f8f8b", "#8a5a3c")
-LINES = ("#26306b", "#e07b16", "#2f9e7a", "#b0528f", "#7fb9e0", "#8a6d00", "#8c8579")
+LINES = (
+    *("#26306b", "#e07b16", "#2f9e7a", "#b0528f", "#7fb9e0"),
+    *("#8a6d00", "#d03a3a", "#5f4bb6", "#8c8579"),
+)
 OTHER = "other"
 
 IRREGULARITIES = (0.02, 0.05, IRREGULAR, 0.2, 0.5)
 """Irregularities at which another class begins; from `IRREGULAR` on parcels are irregular."""
+
+HECTARE = 1e4
+"""Square metres of a hectare."""
+
+MOST_EDGES = 6
+"""Areas at which another class of blocks begins, at most."""
+
+WIDE = 5.0
+"""Areas that are so many times larger than others are classed by factors."""
 
 CLASSES = 6
 """Classes of frontage, besides none."""
@@ -57,7 +69,9 @@ class Theme:
     title
         Heading, such as ``Frontage``.
     layer
-        Layer that is coloured: ``parcels``, or ``streets`` as lines.
+        Layer that is coloured: ``parcels``, ``blocks``, or ``streets`` as lines.
+    column
+        Column that says the class: a side without a known value of it has no such map.
     classes
         Colours and what they stand for.
     class_of
@@ -71,10 +85,18 @@ class Theme:
     name: str
     title: str
     layer: str
+    column: str
     classes: tuple[MapClass, ...]
     class_of: Callable[[Table], IntArray]
     sentence: Callable[[Table], str]
     note: str = ""
+
+    def shows(self, table: Table | None) -> bool:
+        """Whether a side has something to show of it."""
+        if table is None or self.column not in table.columns:
+            return False
+        values = table[self.column]
+        return values.dtype == object or bool(np.isfinite(values.astype(np.float64)).any())
 
 
 def themes(sides: Sequence[dict[str, Table]]) -> list[Theme]:
@@ -90,6 +112,8 @@ def themes(sides: Sequence[dict[str, Table]]) -> list[Theme]:
     makers = (_irregularity, _frontage, _level, _undesirable, _land_use)
     made = [make(parcels) for make in makers] if parcels else []
     made.append(_street_classes(streets) if streets else None)
+    blocks = [side["blocks"] for side in sides if "blocks" in side]
+    made.append(_block_area(blocks) if blocks else None)
     return [theme for theme in made if theme is not None]
 
 
@@ -130,6 +154,7 @@ def _irregularity(parcels: Sequence[Table]) -> Theme | None:
         "irregularity",
         "Irregularity",
         "parcels",
+        "irregularity",
         (*classes, MapClass("not known", HATCHED)),
         _classed("irregularity", IRREGULARITIES, len(classes)),
         sentence,
@@ -154,12 +179,14 @@ def _frontage(parcels: Sequence[Table]) -> Theme | None:
         frontage = np.asarray(table["frontage_m"], dtype=np.float64)
         none = int((np.round(frontage, 3) <= 0.0).sum())
         median = with_unit(float(np.median(frontage)), "m", 1)
-        return f"{_of(none, table)} have no frontage; the median is {median}."
+        who = f"{_of(none, table)} have no" if none else f"All {len(table):,} parcels have"
+        return f"{who} frontage; the median is {median}."
 
     return Theme(
         "frontage",
         "Frontage",
         "parcels",
+        "frontage_m",
         tuple(MapClass(text, fill) for text, fill in zip(labels, fills, strict=True)),
         _classed("frontage_m", [1e-3, *steps], 0),
         sentence,
@@ -190,10 +217,11 @@ def _level(parcels: Sequence[Table]) -> Theme | None:
         "level",
         "Level",
         "parcels",
+        "level",
         (*classes, MapClass("not known", HATCHED)),
         _classed("level", starts[1:], len(classes)),
         sentence,
-        "Number of cuts that made a parcel out of its part of the land.",
+        "How many times the land was cut in two until a parcel was left.",
     )
 
 
@@ -208,6 +236,7 @@ def _undesirable(parcels: Sequence[Table]) -> Theme | None:
         "undesirable",
         "Undesirable parcels",
         "parcels",
+        "undesirable",
         (MapClass("desirable", PALE), MapClass("undesirable", BAD)),
         _classed("undesirable", [0.5], 0),
         sentence,
@@ -232,6 +261,7 @@ def _land_use(parcels: Sequence[Table]) -> Theme | None:
         "land-use",
         "Land use",
         "parcels",
+        "land_use",
         tuple(classes),
         _named("land_use", shown),
         lambda table: f"{counted(len(set(map(str, table['land_use']))), 'land use')}.",
@@ -249,16 +279,73 @@ def _street_classes(streets: Sequence[Table]) -> Theme | None:
 
     def sentence(table: Table) -> str:
         length = with_unit(float(np.sum(table["length_m"])) / 1000, "km", 1)
-        return f"{length} of streets, those along the rim of the land included."
+        return f"{length} of streets, those along the edge of the land included."
 
     return Theme(
         "streets",
         "Streets by class",
         "streets",
+        "class",
         tuple(classes),
         _named("class", shown),
         sentence,
     )
+
+
+def _block_area(blocks: Sequence[Table]) -> Theme | None:
+    areas = _pooled(blocks, "area_m2")
+    if not len(areas):
+        return None
+    low, high = np.round(np.quantile(areas, (0.05, 0.95)), 3).tolist()
+    edges = round_edges(low, high)
+    hectares = (edges[-1] if edges else high) >= HECTARE
+    unit, size = ("ha", HECTARE) if hectares else ("m²", 1.0)
+    texts = [f"{edge / size:,g}" for edge in edges]
+    labels = [f"about {with_unit(high / size, unit)}"]
+    if edges:
+        between = [f"{text} {unit}" for text in _ranges(texts)]
+        labels = [f"under {texts[0]} {unit}", *between, f"{texts[-1]} {unit} and more"]
+
+    def sentence(table: Table) -> str:
+        known = np.asarray(table["area_m2"], dtype=np.float64)
+        middle = with_unit(float(np.median(known)) / size, unit)
+        return f"{counted(len(table), 'block')}; half of them are larger than {middle}."
+
+    return Theme(
+        "blocks",
+        "Blocks by area",
+        "blocks",
+        "area_m2",
+        # the two darkest are hard to tell apart on large areas
+        tuple(MapClass(t, f) for t, f in zip(labels, _spread(COOL[:-1], len(labels)), strict=True)),
+        _classed("area_m2", edges, 0),
+        sentence,
+        "Land that streets enclose, or streets and the boundary of the land; its area reaches to "
+        "the middle of the streets.",
+    )
+
+
+def round_edges(low: float, high: float) -> list[float]:
+    """Return round numbers between two that part values of that range, `MOST_EDGES` at most.
+
+    They grow by factors where the range is wide, and by steps where it is not.
+
+    >>> round_edges(900.0, 60000.0), round_edges(410.0, 690.0), round_edges(5.0, 5.0)
+    ([1000.0, 2000.0, 5000.0, 10000.0, 20000.0, 50000.0], [450.0, 500.0, 550.0, 600.0, 650.0], [])
+    """
+    if not 0.0 < low < high * (1 - 1e-6):
+        return []
+    if high < WIDE * low:
+        step = round_up((high - low) / MOST_EDGES)
+        first, last = math.floor(low / step + 1e-9) + 1, math.ceil(high / step - 1e-9)
+        return [step * k for k in range(first, last)]
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    found: list[float] = []
+    for steps in ((1, 2, 5), (1, 3), (1,)):
+        found = [s * 10.0**p for p in powers for s in steps if low <= s * 10.0**p <= high]
+        if len(found) <= MOST_EDGES:
+            break
+    return found[-MOST_EDGES:]
 
 
 def _by_weight(tables: Sequence[Table], column: str, weight: str) -> list[str]:

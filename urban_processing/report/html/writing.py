@@ -47,6 +47,27 @@ def report_problems(
     return problems
 
 
+def write(report: Report, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
+    """Write a report as the ending of the file says.
+
+    ``.html`` is the page, ``.json`` all its figures (see `report_json`), ``.csv`` the table of
+    metrics (see `report_csv`).
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written there.
+    DependencyError
+        If it is a page and jinja2 is not installed.
+    """
+    ending = Path(path).suffix.lower()
+    writers = {PAGE: write_report, JSON: write_json, CSV: write_csv}
+    for endings, writer in writers.items():
+        if ending in endings:
+            return writer(report, path, overwrite=overwrite)
+    raise OutputError(f"The report {path} must end in {PAGE[0]}, {JSON[0]} or {CSV[0]}.")
+
+
 def write_report(report: Report, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
     """Write a report as one HTML file that needs nothing else; the same report, the same bytes.
 
