@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import requests
 import shapely
+import shapely.affinity
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from osm_towns import (
@@ -33,6 +34,7 @@ from urban_processing.errors import BoundaryError, Cancelled, DependencyError
 from urban_processing.io.blocks import read_streets
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.osm import ATTRIBUTION, ObservedStreets, read_osm_streets
+from urban_processing.io.osm_faces import are_blocks
 from urban_processing.io.osm_network import cut_at
 from urban_processing.io.osm_ways import CLASSES, KEPT_TAGS, overpass_filter
 from urban_processing.progress import CallbackProgress
@@ -141,6 +143,79 @@ def test_slip_road_vanishes(tmp_path: Path) -> None:
     assert near == [4]
 
 
+@pytest.mark.parametrize("n", [4, 10])
+def test_a_grid_of_small_blocks_stays_as_mapped(n: int, tmp_path: Path) -> None:
+    """Blocks of 60 x 100 m, few and many of them."""
+    town, xs, ys = Town(), [60.0 * i for i in range(n)], [100.0 * i for i in range(n)]
+    for x in xs:
+        town.way(*[(x, y) for y in ys])
+    for y in ys:
+        town.way(*[(x, y) for x in xs])
+    path, site = town.write(tmp_path / "town.osm"), land(-20, -20, 60 * n, 100 * n)
+    cleaned = read_osm_streets(site, osm_file=path)
+    assert same(cleaned, read_osm_streets(site, osm_file=path, clean=False))
+    assert "by 0.00 km" in codes(cleaned)["osm_smaller"]
+    assert "osm_uncovered" not in codes(cleaned)
+
+
+def test_small_blocks_stay_beside_what_is_cleaned(tmp_path: Path) -> None:
+    """A roundabout, an avenue and a slip road, each with a grid of blocks of 60 x 100 m."""
+    for i, town in enumerate((roundabout_town(), avenue_town(), slip_road_town())):
+        far = 1000.0
+        xs, ys = [far + 60.0 * i for i in range(8)], [100.0 * i for i in range(8)]
+        for x in xs:
+            town.way(*[(x, y) for y in ys])
+        for y in ys:
+            town.way(*[(x, y) for x in xs])
+        town.way((400.0, 0.0), (far, 0.0))
+        path, site = town.write(tmp_path / f"town{i}.osm"), land(-20, -20, 1500, 800)
+        cleaned = read_osm_streets(site, osm_file=path)
+        faces = shapely.get_parts(shapely.polygonize(local(cleaned)))
+        blocks = faces[shapely.get_coordinates(shapely.centroid(faces))[:, 0] > far]
+        assert shapely.area(blocks) == pytest.approx([6000.0] * 49, rel=1e-3)
+        mapped = read_osm_streets(site, osm_file=path, clean=False)
+        less = shapely.length(local(mapped)).sum() - shapely.length(local(cleaned)).sum()
+        assert less > 10.0
+        assert f"by {less / 1e3:.2f} km" in codes(cleaned)["osm_smaller"]
+
+
+@pytest.mark.parametrize(
+    ("face", "block"),
+    [
+        (shapely.box(0, 0, 60, 100), True),
+        (shapely.box(0, 0, 30, 120), True),
+        (shapely.box(0, 0, 55, 55), True),
+        (shapely.box(0, 0, 20, 300), False),
+        (shapely.box(0, 0, 27, 400), False),
+        (shapely.Point(0, 0).buffer(38.0), False),
+        (shapely.Point(0, 0).buffer(60.0), True),
+        (shapely.Polygon([(0, 0), (52, 0), (0, 52)]), False),
+        (shapely.Polygon([(0, 0), (120, 0), (0, 120)]), True),
+    ],
+)
+def test_what_is_a_block(face: shapely.Polygon, block: bool) -> None:
+    for angle in (0.0, 17.0):
+        turned = shapely.affinity.rotate(face, angle)
+        assert are_blocks(np.array([turned], dtype=object)).tolist() == [block]
+
+
+def test_streets_that_would_be_lost_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import neatnet
+
+    path, site = avenue_town().write(tmp_path / "town.osm"), land(-50, 50, 650, 550)
+    mapped = read_osm_streets(site, osm_file=path, clean=False)
+    monkeypatch.setattr(neatnet, "neatify", lambda frame, **options: frame.iloc[::2])
+    observed = read_osm_streets(site, osm_file=path)
+    assert same(observed, mapped)
+    assert "would be lost" in codes(observed)["osm_not_cleaned"]
+
+
+def test_an_extract_of_a_part_of_the_land_is_told(tmp_path: Path) -> None:
+    path = Town().grid().write(tmp_path / "town.osm")
+    observed = read_osm_streets(land(-20, -20, 2400, 620), osm_file=path)
+    assert "a part of the land" in codes(observed)["osm_uncovered"]
+
+
 def test_blocks_beside_an_artifact_stay(tmp_path: Path) -> None:
     """The only neighbour of the one block is a median: it is no roundabout for that."""
     town = Town()
@@ -243,6 +318,7 @@ def test_what_neatnet_skips_or_severs_is_told(
 
     town = Town().grid(3, step=50.0).way((100.0, 100.0), (150.0, 150.0))
     town.way((190.0, 150.0), (150.0, 150.0), (150.0, 190.0))
+    town.way((0.0, 0.0), (-9000.0, 0.0))  # next to which what is lost is little
     site = land(-50, -50, 220, 220)
     origin = np.array(site.frame.origin)
     monkeypatch.setattr(neatnet, "neatify", neatify)

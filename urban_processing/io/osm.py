@@ -18,7 +18,14 @@ from urban_processing.io.crs import PYPROJ, WGS84
 from urban_processing.io.osm_cleaning import cleaned, import_neatnet
 from urban_processing.io.osm_download import fetch_ways
 from urban_processing.io.osm_files import read_ways
-from urban_processing.io.osm_network import Lines, cut_at, network_edges, reaching, tags_along
+from urban_processing.io.osm_network import (
+    Lines,
+    cut_at,
+    intersections_of,
+    network_edges,
+    reaching,
+    tags_along,
+)
 from urban_processing.io.osm_ways import CLASSES, MOTORWAYS, OsmWays, are_streets
 from urban_processing.progress import SILENT, Progress
 from urban_processing.site import Issue, Site, snap_to_grid
@@ -34,6 +41,12 @@ CLEANED_AROUND = 200.0
 
 READ_AROUND = 600.0
 """Metres around the land within which ways are read, so that carriageways close beyond it."""
+
+FAR_FROM_WAYS = 300.0
+"""Metres from all ways of a file, footpaths and tracks among them, beyond which it may not cover the land."""
+
+UNCOVERED = 0.1
+"""Share of the land so far from ways from which on it is told."""
 
 SHORTEST_END = 1.0
 """Length in metres under which what the boundary leaves of a street vanishes."""
@@ -114,6 +127,7 @@ def read_osm_streets(
     if not shapely.intersects(shapely.union_all(land.parts), edges).any():
         raise elsewhere
     around = shapely.union_all(shapely.buffer(np.array(land.parts), CLEANED_AROUND))
+    mapped = cut_at(edges, land.parts, SHORTEST_END)
     if clean:
         progress.update(0.4, "Cleaning streets")
         fast = np.isin(streets.tags[HIGHWAY].astype(str), sorted(MOTORWAYS))
@@ -125,6 +139,10 @@ def read_osm_streets(
     edges = cut_at(edges, land.parts, SHORTEST_END)
     if not len(edges):
         raise elsewhere
+    if clean:
+        issues += _smaller(mapped, edges)
+    if osm_file is not None:
+        issues += _uncovered(_local(ways, land, crs), land, source)
     frame = _frame(edges, lines, streets, land)
     issues.append(_summary(edges))
     progress.update(1.0)
@@ -223,6 +241,32 @@ def _cleaned(ground: Lines, motorways: Lines, crs: pyproj.CRS, issues: list[Issu
         )
         issues.append(Issue("osm_severed", message, value=float(network.severed)))
     return network.edges
+
+
+def _smaller(mapped: Lines, cleaned: Lines) -> list[Issue]:
+    """What cleaning took of the network within the boundary."""
+    less = float(shapely.length(mapped).sum() - shapely.length(cleaned).sum())
+    fewer = intersections_of(mapped) - intersections_of(cleaned)
+    message = (
+        f"Cleaning made the network within the boundary smaller by {less / 1e3:.2f} km (of "
+        f"{shapely.length(mapped).sum() / 1e3:.2f}) and {fewer} intersection(s) (of "
+        f"{intersections_of(mapped)})."
+    )
+    return [Issue("osm_smaller", message, value=less)]
+
+
+def _uncovered(ways: Lines, land: Site, source: str) -> list[Issue]:
+    """Whether a file may be an extract of a part of the land only."""
+    parts = shapely.union_all(land.parts)
+    reached = shapely.union_all(shapely.buffer(ways, FAR_FROM_WAYS, quad_segs=2))
+    share = 1.0 - shapely.intersection(parts, reached).area / parts.area
+    if share < UNCOVERED:
+        return []
+    message = (
+        f"{share:.0%} of the land lies more than {FAR_FROM_WAYS:g} m from any way of "
+        f"{source}: there is none, or it is an extract that covers only a part of the land."
+    )
+    return [Issue("osm_uncovered", message, value=share)]
 
 
 def _frame(edges: Lines, lines: Lines, streets: OsmWays, land: Site) -> geopandas.GeoDataFrame:

@@ -11,6 +11,14 @@ import pyproj
 import shapely
 
 from urban_processing.errors import DependencyError
+from urban_processing.io.osm_faces import (
+    ROUNDABOUT,
+    are_blocks,
+    are_roundabouts,
+    faces_of,
+    lost_streets,
+    middles_of,
+)
 from urban_processing.io.osm_network import Lines, ends_of, network_edges, pieces_of
 from urban_processing.io.osm_ways import objects
 from urban_processing.site import snap_to_grid
@@ -18,21 +26,20 @@ from urban_processing.site import snap_to_grid
 FEWEST_FACES = 2
 """Faces of a network that neatnet needs to tell small ones from blocks."""
 
-MANY_FACES = 50
-"""Faces from which on neatnet may find by itself what divides small ones from blocks."""
+LARGEST_ARTIFACT = float(np.log(ROUNDABOUT))
+"""Logarithm of area times compactness up to which neatnet takes a face for an artifact, unless
+`are_blocks` says otherwise: that of the largest roundabout, which no narrow face reaches. The one
+that neatnet would find depends on the other faces, and in a grid it may take the blocks away."""
 
-SMALL_FACE = 7.0
-"""Logarithm of area times compactness that divides them in smaller networks; neatnet's own where
-it finds none. Between two clusters of few blocks it would find one that takes blocks away."""
+MOST_LOST = 0.01
+"""Share of a network's length that may be lost when it is cleaned: dead ends between carriageways,
+and what interchanges have at their rims."""
 
-ROUNDABOUT = 5e3
-"""Area in m² up to which a face among artifacts may be a roundabout; neatnet's 50,000 takes blocks
-away whose only neighbours are such."""
+LONGEST_LOST = 100.0
+"""Length in metres of a single street from which on its loss is no matter of cleaning."""
 
-LONG_FACE = 2e4
-"""Area in m² up to which a long face beside an artifact is one, too: those of this area are 43 m
-wide at most; neatnet's 100,000 takes blocks between parallel streets away, with the dead ends in
-them."""
+CONSOLIDATED = 2.1
+"""Metres within which neatnet makes one of several junctions before it looks at faces."""
 
 REACH = 30.0
 """Metres within which the end of a motorway's slip road follows a street that was moved."""
@@ -93,8 +100,10 @@ def cleaned(streets: Lines, motorways: Lines, crs: pyproj.CRS) -> CleanedNetwork
     """Bring both carriageways of a street to one line, and roundabouts to a junction.
 
     The method is neatnet's adaptive continuity-preserving simplification (Fleischmann et al.
-    2026): faces of the network that are too small or too narrow for a block are replaced by the
-    line in their middle, in a way that streets go on as before. It knows nothing of levels and
+    2026): faces of the network that are no blocks (`osm_faces.are_blocks`) are replaced by the
+    line in their middle, in a way that streets go on as before. Where streets are lost for
+    all that (`LONGEST_LOST`, `MOST_LOST`), the faces beside them stay as they are mapped, and the
+    whole network if that does not help. neatnet knows nothing of levels and
     would draw a street into the motorway above it: motorways stay as they are mapped, and their
     slip roads end where the street is that they led to.
 
@@ -114,20 +123,34 @@ def cleaned(streets: Lines, motorways: Lines, crs: pyproj.CRS) -> CleanedNetwork
         If neatnet is not installed.
     """
     mapped = network_edges(np.concatenate([streets, motorways]))
-    faces = shapely.get_parts(shapely.polygonize(streets))
+    faces = faces_of(streets)
     if len(faces) < FEWEST_FACES:
         why = f"neatnet needs a network that encloses {FEWEST_FACES} faces or more"
         return CleanedNetwork(mapped, failure=why if len(faces) else "")
-    lines, skipped, failure = _neatified(streets, crs, len(faces) >= MANY_FACES)
+    kept, left = are_blocks(faces), 0
+    rings = faces[are_roundabouts(faces)]  # no loss: a junction in their middle
+    lines, skipped, failure = _neatified(streets, faces[kept], crs)
+    lost = lost_streets(streets, np.concatenate([lines, rings]))
+    if _share(lost, streets) > MOST_LOST or shapely.length(lost).max(initial=0.0) > LONGEST_LOST:
+        beside = shapely.dwithin(shapely.union_all(lost), faces, AT_VERTEX) & ~kept
+        left = int(beside.sum())
+        lines, skipped, failure = _neatified(streets, faces[kept | beside], crs)
+        lost = lost_streets(streets, np.concatenate([lines, rings]))
+        if _share(lost, streets) > MOST_LOST:
+            failure = f"{shapely.length(lost).sum() / 1e3:.1f} km of streets would be lost"
     if failure:
         return CleanedNetwork(mapped, failure=failure)
     ground, slip_roads = _met(network_edges(lines), motorways, streets)
     edges = network_edges(np.concatenate([ground, slip_roads]))
     severed = max(0, pieces_of(edges) - pieces_of(mapped))
-    return CleanedNetwork(edges, skipped=skipped, severed=severed)
+    return CleanedNetwork(edges, skipped=skipped + left, severed=severed)
 
 
-def _neatified(streets: Lines, crs: pyproj.CRS, many: bool) -> tuple[Lines, int, str]:
+def _share(lost: Lines, streets: Lines) -> float:
+    return float(shapely.length(lost).sum() / shapely.length(streets).sum())
+
+
+def _neatified(streets: Lines, blocks: Lines, crs: pyproj.CRS) -> tuple[Lines, int, str]:
     """Lines of neatnet, the places that it skipped, and why it failed, if it did.
 
     Its second round fails where the first one left no face; then the first one's result counts.
@@ -143,12 +166,16 @@ def _neatified(streets: Lines, crs: pyproj.CRS, many: bool) -> tuple[Lines, int,
             warnings.simplefilter("always")
             try:
                 frame = geopandas.GeoDataFrame(geometry=streets, crs=crs)
+                inside = geopandas.GeoSeries(
+                    middles_of(np.concatenate([blocks, _blocks_of(frame)])), crs=crs
+                )
                 result = neatnet.neatify(
                     frame,
                     n_loops=rounds,
-                    artifact_threshold=None if many else SMALL_FACE,
-                    area_threshold_circles=ROUNDABOUT,
-                    area_threshold_blocks=LONG_FACE,
+                    exclusion_mask=inside,
+                    artifact_threshold=LARGEST_ARTIFACT,
+                    area_threshold_blocks=0.0,  # nor do neighbours make a face an artifact
+                    area_threshold_circles=0.0,
                 )
             except _FAILURES as error:
                 failure = f"{type(error).__name__}: {_line(error)}"
@@ -157,6 +184,17 @@ def _neatified(streets: Lines, crs: pyproj.CRS, many: bool) -> tuple[Lines, int,
         skipped = sum(_SKIPPED in str(note.message) for note in said)
         return np.asarray(shapely.transform(lines, snap_to_grid), dtype=object), skipped, ""
     return streets, 0, failure
+
+
+def _blocks_of(frame: Any) -> Lines:
+    """Blocks of a network where neatnet has closed its gaps, as it does before it looks at faces.
+
+    A face that a gap of some millimetres left open in the network as mapped is among them.
+    """
+    neatnet = import_neatnet()
+    closed = neatnet.consolidate_nodes(neatnet.fix_topology(frame), tolerance=CONSOLIDATED)
+    faces = faces_of(np.asarray(closed.geometry, dtype=object))
+    return faces[are_blocks(faces)]
 
 
 def _met(ground: Lines, motorways: Lines, streets: Lines) -> tuple[Lines, Lines]:

@@ -102,6 +102,12 @@ def pieces_of(edges: Lines) -> int:
     return int(count)
 
 
+def intersections_of(edges: Lines) -> int:
+    """Count the places where three or more edges end."""
+    _, degree = np.unique(ends_of(edges).reshape(-1, 2), axis=0, return_counts=True)
+    return int((degree >= 3).sum())
+
+
 def cut_at(edges: Lines, parts: Sequence[shapely.Polygon], shortest: float) -> Lines:
     """Edges within the parts of the land; ends at its boundary shorter than `shortest` vanish.
 
