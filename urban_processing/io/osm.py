@@ -43,7 +43,8 @@ READ_AROUND = 600.0
 """Metres around the land within which ways are read, so that carriageways close beyond it."""
 
 FAR_FROM_WAYS = 300.0
-"""Metres from all ways of a file, footpaths and tracks among them, beyond which it may not cover the land."""
+"""Metres from all ways of a file, footpaths and tracks among them, beyond which it may not cover
+the land."""
 
 UNCOVERED = 0.1
 """Share of the land so far from ways from which on it is told."""
