@@ -198,6 +198,27 @@ def test_what_is_there_is_the_reference(layout: up.GeoLayout, tmp_path: Path) ->
     assert layers.sides["real"].metric("unreached") == 0
 
 
+def test_a_mapping_names_the_sides(layout: up.GeoLayout, town: up.GeoFabric) -> None:
+    found = up.compare({"plan": layout, "town": town})
+    assert list(found.sides) == ["plan", "town"]
+    assert found.compared.comparison.shared_land[0] == pytest.approx(1.0)
+    for wrong in (({"a": layout}, town), ({"a": layout}, {"b": town})):
+        with pytest.raises(ParameterError, match=r"one by one .* names=\["):
+            up.compare(*wrong)
+    with pytest.raises(ParameterError, match="one mapping of names"):
+        up.compare({"a": layout, "b": town}, names=["c"])
+
+
+def test_other_lands_are_told_first(town: up.GeoFabric) -> None:
+    away = up.cogenerate(
+        shapely.transform(land(), lambda xy: xy + np.array((5000.0, 0.0))), crs=CRS, min_area=500
+    )
+    found = up.compare(town, away)
+    about, said = found.made.summary[0]
+    assert about == "lands"
+    assert said.endswith(": they lie apart.")
+
+
 # ---- errors
 
 

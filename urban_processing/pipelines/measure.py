@@ -9,6 +9,7 @@ from hashlib import sha256
 
 from urban_processing.errors import ParameterError
 from urban_processing.fabric.model import ComparedFabrics, Fabric
+from urban_processing.metrics.common_land import shared_land
 from urban_processing.metrics.comparison import Comparison, Side, compare, unique_names
 from urban_processing.metrics.measures import FabricMeasures
 from urban_processing.metrics.samples import samples
@@ -109,6 +110,7 @@ def compare_fabrics(
         seed=params.seed,
         resamples=params.resamples,
         confidence=params.confidence,
+        shared_land=[shared_land(f, fabrics[names.index(reference)]) for f in fabrics],
     )
     progress.update(1.0, "Compared")
     digest = sha256("".join(known.fabric.input_sha256 for known in measured).encode())
