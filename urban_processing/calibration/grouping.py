@@ -10,6 +10,7 @@ from urban_processing.blocks.model import rings_of
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.polygons import by_place
 from urban_processing.site import GRID
 
 ObjectArray = npt.NDArray[np.object_]
@@ -64,15 +65,8 @@ def blocks_of(parcels: ObjectArray, *, gap: float) -> tuple[ObjectArray, IntArra
         made += len(own)
         pieces.append(own)
     blocks = canonical_rings(_apart(shapely.set_precision(np.concatenate(pieces), GRID)))
-    by_place = in_order_of_place(blocks)
-    return blocks[by_place], np.argsort(by_place)[block]
-
-
-def in_order_of_place(polygons: ObjectArray) -> IntArray:
-    """(n,) rows of polygons, from west to east, then south to north."""
-    west, south, east, north = np.round(shapely.bounds(polygons), 6).T
-    area = np.round(shapely.area(polygons), 6)
-    return np.lexsort((area, north, east, south, west))
+    order = by_place(blocks)
+    return blocks[order], np.argsort(order)[block]
 
 
 def _neighbours(parcels: ObjectArray, reach: float) -> IntArray:
@@ -130,7 +124,7 @@ def _without_holes(polygon: shapely.Polygon, most: float) -> shapely.Polygon:
 def _apart(blocks: ObjectArray) -> ObjectArray:
     """Blocks less the smaller ones that lie in them: in a hole that was filled, or by a hair."""
     a, b = shapely.STRtree(blocks).query(blocks, predicate="intersects")
-    smaller = np.lexsort((in_order_of_place(blocks), np.round(shapely.area(blocks), 6)))
+    smaller = np.lexsort((by_place(blocks), np.round(shapely.area(blocks), 6)))
     rank = np.argsort(smaller)
     a, b = a[rank[a] > rank[b]], b[rank[a] > rank[b]]
     common = shapely.area(shapely.intersection(blocks[a], blocks[b])) > 0
