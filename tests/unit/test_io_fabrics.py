@@ -118,7 +118,9 @@ def test_a_file_of_several_layers_asks_for_their_names(tmp_path: Path) -> None:
 
 def test_a_single_layer_by_its_name_is_to_be_called_what_it_is(tmp_path: Path) -> None:
     path = file_of(tmp_path / "plan.gpkg", plots=at(LOTS))
-    with pytest.raises(BoundaryError, match=r"is one layer: give it as parcels \(--parcel-layer\) or as streets"):
+    with pytest.raises(
+        BoundaryError, match=r"is one layer: give it as parcels \(--parcel-layer\) or as streets"
+    ):
         read_fabric(f"{path}|layername=plots")
 
 
