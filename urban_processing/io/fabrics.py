@@ -215,6 +215,13 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
             f"{path} cannot be read: it is no layout file, and no other file with layers that GDAL "
             "knows, or it is damaged."
         ) from error
+    return _of_kinds(path, layers, given)
+
+
+def _of_kinds(
+    path: str, layers: Sequence[tuple[str, str | None]], given: dict[str, Source | None]
+) -> dict[str, Source | None]:
+    """Layers of a file by their names, else the only ones with polygons and with lines."""
     found: dict[str, Source | None] = {}
     problems = []
     for name, layer, geometry in (
