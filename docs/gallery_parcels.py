@@ -122,7 +122,7 @@ def picture(name: str) -> Figure:
     colours = ScalarMappable(LogNorm(1.0, 6.0), "RdYlGn_r")
     (x, y), half = city.centre, city.half
     for k, (side, parcels) in enumerate(sides(name).items()):
-        ax = drawn.add_axes((0.005 + 0.325 * k, 0.37, 0.315, 0.58))
+        ax = drawn.add_axes((0.005 + 0.32 * k, 0.37, 0.312, 0.58))
         shown = parcels.cx[x - half : x + half, y - half : y + half]
         aspect = shown.box_length_m / shown.box_width_m
         colour = colours.to_rgba(aspect.to_numpy())
@@ -133,7 +133,7 @@ def picture(name: str) -> Figure:
         median = float(np.median(parcels.area_m2))
         text = f"{city.title}, {side}: {len(parcels):,} parcels, median {median:,.0f} m²"
         ax.set_title(text, loc="left", size=10)
-    bar = drawn.add_axes((0.972, 0.42, 0.008, 0.4))
+    bar = drawn.add_axes((0.9625, 0.45, 0.008, 0.4))
     drawn.colorbar(colours, cax=bar, label="Length over width", ticks=[1, 2, 3, 4, 6], format="%g")
     bar.minorticks_off()
     for k, (key, label) in enumerate(MEASURES.items()):

@@ -208,7 +208,21 @@ def metric_table(names: Sequence[str]) -> str:
                 )
             )
         lines.append(f"| `{metric}`{unit and ', ' + unit} | " + " | ".join(cells) + " |")
+    lines.append("| the same without rim streets | " + " | ".join(map(detours, names)) + " |")
     return "\n".join(lines)
+
+
+def detours(name: str) -> str:
+    """Detours of both sides where the rim of the layout is no street, the better one in bold."""
+    found = compared(name)[0]
+    made = found.sides[GENERATED]
+    streets = made.frame("streets")
+    inner = up.measure(streets=streets[streets["class"] != "rim"], land=made.frame("boundary"))
+    values = [side.metric("network_detour") for side in (found.sides[REAL], inner)]
+    cells = [f"{value:.2f}" for value in values]
+    return " / ".join(
+        f"**{c}**" if v == min(values) else c for c, v in zip(cells, values, strict=True)
+    )
 
 
 def distance_table(names: Sequence[str]) -> str:

@@ -7,10 +7,12 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import geopandas as gpd
+import numpy as np
 import pytest
 import shapely
 from measured_files import CRS, frame, land, osm_town, placed, plot_frame, plots, street_frame
@@ -23,7 +25,9 @@ from urban_processing.errors import (
     ParameterError,
     UrbanError,
 )
+from urban_processing.metrics.measures import FabricMeasures
 from urban_processing.progress import CallbackProgress
+from urban_processing.site import FloatArray
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +113,22 @@ def test_streets_or_parcels_alone() -> None:
     parcels = up.measure(plot_frame())
     assert parcels.metric("parcels") == 12
     assert math.isnan(parcels.metric("unreached"))
+
+
+def test_frontage_at_the_end_of_a_street_makes_no_negative_way(town: up.GeoFabric) -> None:
+    """Rounding puts a piece of frontage beyond the end of its street by less than a nanometre."""
+    fabric = town.measures.fabric
+    parcels = fabric.parcels
+    assert parcels is not None
+    end = fabric.network.edge_length[parcels.fronts.edge]
+
+    def measured(at: FloatArray) -> FabricMeasures:
+        fronts = replace(parcels.fronts, at=at)
+        return FabricMeasures(replace(fabric, parcels=replace(parcels, fronts=fronts)))
+
+    at_end, beyond = measured(end), measured(np.nextafter(end, np.inf))
+    for name, value in at_end.values.items():
+        assert beyond.values[name] == pytest.approx(value, nan_ok=True), name
 
 
 @pytest.mark.parametrize("ending", ["html", "json", "csv"])

@@ -9,6 +9,7 @@ import shapely
 from urban_processing.blocks.model import rings_of
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.components import components
+from urban_processing.mesh.places import lower_end_first
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.mesh.polygons import by_place
 from urban_processing.site import GRID
@@ -91,11 +92,7 @@ def _of_one_edge(parcels: ObjectArray, least: float) -> IntArray:
     rings = rings_of(parcels)
     ends = np.stack([rings.xy, rings.xy[rings.following]], axis=1)
     long = np.hypot(*(ends[:, 1] - ends[:, 0]).T) > least
-    owner, ends = rings.edge_block[long], ends[long]
-    turned = (ends[:, 0, 0] > ends[:, 1, 0]) | (
-        (ends[:, 0, 0] == ends[:, 1, 0]) & (ends[:, 0, 1] > ends[:, 1, 1])
-    )
-    ends[turned] = ends[turned][:, ::-1]
+    owner, ends = rings.edge_block[long], lower_end_first(ends[long])
     order = np.lexsort((owner, *ends.reshape(-1, 4).T))
     same = (ends[order[1:]] == ends[order[:-1]]).all(axis=(1, 2))
     low, high = owner[order[:-1]][same], owner[order[1:]][same]

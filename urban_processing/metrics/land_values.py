@@ -8,25 +8,25 @@ import numpy as np
 import shapely
 
 from urban_processing.fabric.model import UNKNOWN_LEVEL, Fabric
-from urban_processing.layout import PARCEL_USE
 from urban_processing.metrics.averages import in_part
 
 PARK_USES = frozenset(
     {
-        "allotments",
-        "forest",
-        "garden",
-        "grass",
-        "green",
-        "park",
-        "playground",
-        "recreation",
-        "recreation_ground",
-        "village_green",
-        "wood",
+        "allotments", "forest", "garden", "grass", "green", "park", "playground", "recreation",
+        "recreation_ground", "village_green", "wood",
     }
-)
+)  # fmt: skip
 """Land uses that are parks, as plans and OpenStreetMap name them."""
+
+OTHER_USES = frozenset(
+    {
+        "brownfield", "cemetery", "civic", "commercial", "construction", "education", "government",
+        "greenfield", "hospital", "industrial", "institutional", "landfill", "locked", "military",
+        "office", "parking", "patio", "public", "quarry", "railway", "religious", "remnant",
+        "retail", "school", "transport", "university", "utility", "vacant", "water",
+    }
+)  # fmt: skip
+"""Land uses that are neither parks nor parcels to live on."""
 
 
 def land_area(fabric: Fabric, part: int | None) -> float:
@@ -65,8 +65,10 @@ def _land_uses(fabric: Fabric, part: int | None) -> dict[str, float]:
         return values
     inside = in_part(parcels.part, part)
     net, use = parcels.net_area[inside], parcels.land_use[inside]
-    plain = float(net[use == PARCEL_USE].sum())
-    parks = float(net[np.isin(use.astype(str), sorted(PARK_USES))].sum())
+    named = np.array([str(name).strip().lower() for name in use.tolist()], dtype=np.str_)
+    is_park, is_other = (np.isin(named, sorted(uses)) for uses in (PARK_USES, OTHER_USES))
+    plain = float(net[~is_park & ~is_other].sum())
+    parks = float(net[is_park].sum())
     return {
         **values,
         "land_use_parcels_pct": 100.0 * plain / land,

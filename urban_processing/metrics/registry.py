@@ -202,7 +202,8 @@ METRICS: tuple[MetricSpec, ...] = (
         "land_use_parcels_pct",
         "%",
         _YANG,
-        "l_r: share of the land in parcels of no special use, less right-of-way.",
+        "l_r: share of the land in parcels that are neither parks nor of another use, such as "
+        "commercial, school or remnant; less right-of-way.",
     ),
     MetricSpec("land_use_parks_pct", "%", _YANG, "l_p: share of the land in parks and gardens."),
     MetricSpec("land_use_other_pct", "%", _YANG, "l_o: share of the land that is none of these."),

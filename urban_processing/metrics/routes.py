@@ -116,11 +116,20 @@ class Routes:
         net, fronts = self.fabric.network, self._fronts
         way = np.minimum(
             self._to_rim[net.start[fronts.edge]] + fronts.at,
-            self._to_rim[net.end[fronts.edge]] + net.edge_length[fronts.edge] - fronts.at,
+            self._to_rim[net.end[fronts.edge]] + self._rest,
         )
         way = np.where(net.edge_rim[fronts.edge], 0.0, way)
         counted = chosen[fronts.parcel] & np.isfinite(way)
         return _ratio((way * self._weight)[counted].sum(), self._weight[counted].sum())
+
+    @cached_property
+    def _rest(self) -> FloatArray:
+        """(A,) metres from the middle of each piece of frontage to the end of its edge.
+
+        A piece at the very end may lie beyond it by rounding, and a way is never negative.
+        """
+        length = self.fabric.network.edge_length[self._fronts.edge]
+        return np.maximum(length - self._fronts.at, 0.0)
 
     @cached_property
     def _between_parcels(self) -> _Sums:
@@ -145,7 +154,7 @@ class Routes:
     def _ways_to_fronts(self, some: IntArray) -> FloatArray:
         """(s, A) ways from some pieces of frontage to all."""
         net, fronts = self.fabric.network, self._fronts
-        edge, at, rest = fronts.edge, fronts.at, net.edge_length[fronts.edge] - fronts.at
+        edge, at, rest = fronts.edge, fronts.at, self._rest
         source = net.n_nodes + np.arange(len(some))
         tails, heads, length = self._links
         graph = _shortest(
