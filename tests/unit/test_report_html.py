@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import shapely
 from grid_layouts import boxes, grid, layout_of
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from reports import (
     NASTY,
@@ -210,6 +210,8 @@ def test_text_from_files_is_escaped_wherever_it_stands() -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(st.text(st.characters(), max_size=30))
+@example("a\rb")
+@example("\r")
 def test_any_name_gives_a_page_and_files(name: str) -> None:
     base = GRID_SIDE
     report = compared([replace(base, name=name), replace(base, name="other")], title=name)
