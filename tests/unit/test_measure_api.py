@@ -294,13 +294,15 @@ for name, each in (("m", measured), ("c", found)):
 
 def test_two_processes_write_the_same_bytes(tmp_path: Path) -> None:
     digests = []
+    running = {}
     for number in ("1", "2"):
         out = tmp_path / number
         out.mkdir()
         script = _SCRIPT.format(tests=str(Path(__file__).parent), out=str(out))
-        subprocess.run(
-            [sys.executable, "-c", script], check=True, env={"PYTHONHASHSEED": number}, timeout=300
-        )
+        command = [sys.executable, "-c", script]
+        running[out] = subprocess.Popen(command, env={"PYTHONHASHSEED": number})
+    for out, process in running.items():
+        assert process.wait(timeout=300) == 0
         files = sorted(out.iterdir())
         digests.append({f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files})
     assert len(digests[0]) == 8

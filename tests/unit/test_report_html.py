@@ -212,6 +212,7 @@ def test_text_from_files_is_escaped_wherever_it_stands() -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(st.text(st.characters(), max_size=30))
+@example("a\rb")
 @example("\r")
 @example("a\r\nb")
 def test_any_name_gives_a_page_and_files(name: str) -> None:

@@ -67,11 +67,15 @@ def measure(
     (2.0, 100.0)
     >>> found.report("report.html")  # doctest: +SKIP
     """
-    usable = None if MeasureParams.problems_with(parameters) else MeasureParams(**parameters)
     params, fabric = gathered(
         lambda: MeasureParams.from_values(parameters),
         lambda: read_fabric(
-            layout, parcels=parcels, streets=streets, land=land, crs=crs, params=usable
+            layout,
+            parcels=parcels,
+            streets=streets,
+            land=land,
+            crs=crs,
+            params=MeasureParams.usable(parameters),
         ),
     )
     return GeoFabric.of(pipeline.measure(fabric, params, progress))
@@ -130,7 +134,7 @@ def compare(
     >>> found.comparison[["metric", "difference"]]  # doctest: +SKIP
     """
     named = _named(layouts, names)
-    wrong = CompareParams.problems_with(parameters)
+    usable = CompareParams.usable(parameters)
     params, compared = gathered(
         lambda: CompareParams.from_values(parameters),
         lambda: read_compared(
@@ -141,8 +145,8 @@ def compare(
             osm_file=osm_file,
             osm=osm,
             crs=crs,
-            params=CompareParams() if wrong else CompareParams.from_values(parameters),
-            fetch=not wrong,
+            params=usable or CompareParams(),
+            fetch=usable is not None,
             progress=progress.slice(0.0, 0.3),
         ),
     )

@@ -51,11 +51,8 @@ def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) 
         input_sha256=fabric.input_sha256,
         seconds=time.perf_counter() - started,
     )
-    measured = FabricMeasures(replace(fabric, history=(*earlier, step)))
-    # what is worked out needs not be worked out again
-    measured.__dict__.update({k: v for k, v in known.__dict__.items() if k != "fabric"})
     progress.update(1.0, "Measured")
-    return measured
+    return known.with_history((*earlier, step))
 
 
 @dataclass(frozen=True, eq=False)

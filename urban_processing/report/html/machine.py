@@ -120,9 +120,9 @@ def report_csv(report: Report) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text that no program takes for a formula; its lines end in one way, which is quoted."""
+    """Text that no program takes for a formula, or its carriage returns for the end of a row."""
     safe = f"'{text}" if text[:1] in _FORMULAS and text else text
-    return safe.replace("\r\n", "\n").replace("\r", "\n")
+    return safe.replace("\r\n", "\n").replace("\r", "\n")  # these csv puts into quotes
 
 
 def _side(name: str, side: ReportSide) -> dict[str, Any]:
