@@ -81,8 +81,8 @@ figure.tight_layout()""",
     ),
     (
         "markdown",
-        "Each row says by how much the layout differs from what is there, and who is better where "
-        "everybody would say the same. Figures of parcels are left out: OpenStreetMap has none.",
+        "Each row says by how much the layout differs from what is there, and who is better by "
+        "what is commonly wanted. Figures of parcels are left out: OpenStreetMap has none.",
     ),
     (
         "code",

@@ -34,6 +34,16 @@ def file_problems(target: Path) -> list[str]:
     return problems
 
 
+def replaced_problems(target: Path, *, overwrite: bool) -> list[str]:
+    """Return why a file may not be replaced; nothing where it may, or there is none."""
+    if overwrite or not target.is_file():
+        return []
+    return [
+        f"The output {target} exists already: choose another name, or allow overwriting "
+        "(--overwrite)."
+    ]
+
+
 def geopackage_problems(target: Path) -> list[str]:
     """Return why a GeoPackage cannot be written or replaced as a whole."""
     problems = []

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
+from grid_layouts import grid
+from hypothesis import given
+from hypothesis import strategies as st
 
 from urban_processing.errors import ParameterError
 from urban_processing.fabric.comparison_layers import COMPARISON, DISTANCES
 from urban_processing.metrics import comparison as comparison_module
 from urban_processing.metrics.bootstrap import Resampling
+from urban_processing.metrics.common_land import shared_land
 from urban_processing.metrics.comparison import (
     Comparison,
     Side,
@@ -20,11 +26,14 @@ from urban_processing.metrics.comparison import (
     histograms,
     unique_names,
 )
+from urban_processing.metrics.comparison_notes import notes
 from urban_processing.metrics.comparison_tables import comparison_layers
 from urban_processing.metrics.comparison_words import words
 from urban_processing.metrics.distributions import DISTRIBUTIONS, Sample
 from urban_processing.metrics.histograms import FEWEST, MOST, MOST_WHOLE, Histogram, histogram
+from urban_processing.metrics.measures import LayoutMeasures
 from urban_processing.metrics.registry import Better, MetricSpec
+from urban_processing.site import Frame
 
 NAN = math.nan
 SPECS = {d.name: d for d in DISTRIBUTIONS}
@@ -317,19 +326,20 @@ def test_a_comparison_of_nothing_has_empty_tables() -> None:
 
 def test_words_say_who_is_better_and_what_differs_most() -> None:
     told = words(three_sides())
-    assert told[0] == (
+    assert told[-1] == (
         "better",
-        "a in 0, b in 1, c <&> in 0 of 2 metrics that tell better from worse, 1 alike",
+        "a in 0, b in 1, c <&> in 0 of 2 metrics, by what is commonly wanted (right angles, four "
+        "sides, short detours); 1 alike",
     )
-    assert told[1] == ("distributions", "2 of 2 differ by more than chance")
-    (name, text), other = told[2:]
+    assert told[0] == ("distributions", "2 of 2 differ by more than chance")
+    (name, text), other = told[1:-1]
     assert name == other[0] == "width of parcels"
     assert "m apart on average (" in text
     assert "median" in text
-    two = words(compared(side("a", {"area_m2": 1.0}), side("b", {"area_m2": 2.0})))
+    two = words(compared(side("a", {"area_m2": 2.0}), side("b", {"area_m2": 2.0})))
     assert two == (
-        ("better", "no metric that two sides have tells better from worse"),
         ("distributions", "0 of 0 differ by more than chance"),
+        ("better", "no metric that two sides have tells better from worse"),
     )
 
 
@@ -342,10 +352,66 @@ def test_words_of_a_single_value_name_no_interval() -> None:
 def test_words_do_not_count_interior_parcels_twice() -> None:
     values = {"irregularity": 0.3, "irregularity_interior": 0.3}
     worse = {"irregularity": 0.5, "irregularity_interior": 0.5}
-    assert words(compared(side("a", values), side("b", worse)))[0] == (
-        "better",
-        "a in 1, b in 0 of 1 metrics that tell better from worse",
+    name, text = words(compared(side("a", values), side("b", worse)))[-1]
+    assert name == "better"
+    assert text.startswith("a in 1, b in 0 of 1 metrics, by what is commonly wanted")
+
+
+def lands(*shared: float, areas: tuple[float, float] = (2e6, 1e6)) -> list[tuple[str, str]]:
+    sides = [side(name, {"area_m2": a}) for name, a in zip("ab", areas, strict=True)]
+    return notes(compare(sides, resamples=2, shared_land=shared))
+
+
+def test_other_lands_are_told() -> None:
+    sizes = "The lands are not the same (1.0 km² in b, 2.0 km² in a): "
+    assert lands(1.0, 0.5) == [("lands", f"{sizes}they share 50 % of their area.")]
+    assert lands(1.0, 0.004) == [("lands", f"{sizes}they share under 1 % of their area.")]
+    assert lands(1.0, 0.0) == [("lands", f"{sizes}they lie apart.")]
+    assert lands(1.0, 0.95) == []
+    assert lands() == [("lands", f"{sizes}how much they share is not known.")]
+    ((_, said),) = lands(1.0, NAN)
+    assert said == f"{sizes}how much they share is not known, for their coordinate systems differ."
+    ((_, said),) = lands(1.0, NAN, areas=(2e5, 2e5))
+    assert said == "It is not known whether the lands are the same: coordinate systems differ."
+    assert lands(areas=(2e5, 2e5)) == lands(1.0, 1.0, areas=(2e5, 2e5)) == []
+    ((_, said),) = lands(1.0, 0.9, areas=(2e5, NAN))
+    assert said == "The lands are not the same: they share 90 % of their area."
+    with pytest.raises(ValueError, match="1 shared lands for 2 sides"):
+        lands(1.0)
+
+
+def test_another_density_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = side("a", block_area_m2=[100.0, 100.0, 900.0]), side("b", block_area_m2=[2500.0])
+    (told,) = notes(compared(a, b))
+    assert told == (
+        "density",
+        "Blocks are 25 times as large (median) in b as in a: another density; figures of size "
+        "differ by that already.",
     )
+    assert words(compared(a, b))[0] == told
+    assert notes(compared(a, side("b", block_area_m2=[150.0]))) == []
+    assert notes(compared(a, side("b"))) == []
+    spec = MetricSpec("area_mean_m2", "m²", "", "Mean.", of_parcels=True)
+    monkeypatch.setattr(comparison_module, "METRICS", (spec,))
+    sides = [side("a", {"area_mean_m2": 400.0}), side("b", {"area_mean_m2": 250.0})]
+    ((_, said),) = notes(compared(*sides), ("A", "B"))
+    assert said.startswith("Parcels are 1.6 times as large (mean) in A as in B: another density")
+
+
+FABRIC = LayoutMeasures(grid(2, 2)).of_fabric.fabric
+
+
+@given(st.floats(0.0, 30.0), st.floats(0.0, 30.0))
+def test_shared_land_is_that_of_two_boxes(dx: float, dy: float) -> None:
+    fabric, (x, y) = FABRIC, FABRIC.frame.origin
+    box = shapely.union_all(fabric.land)
+    x0, y0, x1, y1 = box.bounds
+    moved = replace(fabric, frame=Frame(fabric.frame.crs, (x + dx, y + dy)))
+    common = max(x1 - x0 - dx, 0.0) * max(y1 - y0 - dy, 0.0)
+    share = common / (2 * box.area - common)
+    assert shared_land(fabric, moved) == pytest.approx(share, abs=1e-9)
+    assert shared_land(moved, fabric) == pytest.approx(share, abs=1e-9)
+    assert math.isnan(shared_land(fabric, replace(fabric, frame=Frame("EPSG:2056"))))
 
 
 def test_declarations_are_in_good_order() -> None:

@@ -370,7 +370,11 @@ def test_without_streets_there_is_no_frontage_and_that_is_said() -> None:
     assert codes(made) == {"no_streets_given", "land_assumed"}
     assert values["parcels"] == 10
     assert values["p_angle_deg"] == pytest.approx(0)
-    for name in ("unreached", "frontage_mean_m", "land_use_streets_pct", "rim_distance_m"):
+    unknown = (
+        "unreached", "frontage_mean_m", "land_use_streets_pct", "rim_distance_m",
+        "through_lots", "through_lots_pct", "street_length_relative",
+    )  # fmt: skip
+    for name in unknown:
         assert math.isnan(values[name]), name
     assert values["blocks"] == 0
     assert len(fabric_layers(FabricMeasures(made)).tables) == 7

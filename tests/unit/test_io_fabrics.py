@@ -111,14 +111,16 @@ def test_a_file_of_several_layers_asks_for_their_names(tmp_path: Path) -> None:
     told = "\n".join(caught.value.problems)
     assert "several layers of polygons: plots, buildings" in told
     assert "several layers of lines: axes, pipes" in told
-    assert f"parcels={path}|layername=NAME" in told
+    assert f"parcels (--parcel-layer) as {path}|layername=NAME" in told
     fabric = read_fabric(path, parcels=f"{path}|layername=plots", streets=f"{path}|layername=axes")
     assert values(fabric)["parcels"] == 10
 
 
 def test_a_single_layer_by_its_name_is_to_be_called_what_it_is(tmp_path: Path) -> None:
     path = file_of(tmp_path / "plan.gpkg", plots=at(LOTS))
-    with pytest.raises(BoundaryError, match="is one layer: give it as parcels or as streets"):
+    with pytest.raises(
+        BoundaryError, match=r"is one layer: give it as parcels \(--parcel-layer\) or as streets"
+    ):
         read_fabric(f"{path}|layername=plots")
 
 

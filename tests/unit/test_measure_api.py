@@ -198,6 +198,27 @@ def test_what_is_there_is_the_reference(layout: up.GeoLayout, tmp_path: Path) ->
     assert layers.sides["real"].metric("unreached") == 0
 
 
+def test_a_mapping_names_the_sides(layout: up.GeoLayout, town: up.GeoFabric) -> None:
+    found = up.compare({"plan": layout, "town": town})
+    assert list(found.sides) == ["plan", "town"]
+    assert found.compared.comparison.shared_land[0] == pytest.approx(1.0)
+    for wrong in (({"a": layout}, town), ({"a": layout}, {"b": town})):
+        with pytest.raises(ParameterError, match=r"one by one .* names=\["):
+            up.compare(*wrong)
+    with pytest.raises(ParameterError, match="one mapping of names"):
+        up.compare({"a": layout, "b": town}, names=["c"])
+
+
+def test_other_lands_are_told_first(town: up.GeoFabric) -> None:
+    away = up.cogenerate(
+        shapely.transform(land(), lambda xy: xy + np.array((5000.0, 0.0))), crs=CRS, min_area=500
+    )
+    found = up.compare(town, away)
+    about, said = found.made.summary[0]
+    assert about == "lands"
+    assert said.endswith(": they lie apart.")
+
+
 # ---- errors
 
 
@@ -273,13 +294,15 @@ for name, each in (("m", measured), ("c", found)):
 
 def test_two_processes_write_the_same_bytes(tmp_path: Path) -> None:
     digests = []
+    running = {}
     for number in ("1", "2"):
         out = tmp_path / number
         out.mkdir()
         script = _SCRIPT.format(tests=str(Path(__file__).parent), out=str(out))
-        subprocess.run(
-            [sys.executable, "-c", script], check=True, env={"PYTHONHASHSEED": number}, timeout=300
-        )
+        command = [sys.executable, "-c", script]
+        running[out] = subprocess.Popen(command, env={"PYTHONHASHSEED": number})
+    for out, process in running.items():
+        assert process.wait(timeout=300) == 0
         files = sorted(out.iterdir())
         digests.append({f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files})
     assert len(digests[0]) == 8

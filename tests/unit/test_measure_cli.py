@@ -129,7 +129,7 @@ def test_measuring_without_outputs_sums_up(town: Town) -> None:
     result = done("measure", town / "layout.gpkg")
     rows = summary(result)
     assert rows["land"] == "1.15 ha"
-    assert "0 without a street" in rows["parcels"]
+    assert "0 with too little frontage for access" in rows["parcels"]
     assert list(rows)[-1] == "time"
 
 
@@ -193,7 +193,7 @@ def test_files_of_the_other_algorithms_are_measured(town: Town, tmp_path: Path) 
     result = done("measure", parcels, "--csv", tmp_path / "p.csv")
     assert "There are no streets" in result.stderr
     assert metrics(tmp_path / "p.csv")["parcels"]["parcels"] == f"{n:.1f}"
-    assert "without a street" not in result.stdout
+    assert "frontage for access" not in result.stdout
     (said,) = refused("measure", blocks)
     assert "There are neither parcels nor streets in " in said
     done("measure", town / "layout.gpkg", "-o", tmp_path / "once.gpkg")

@@ -58,6 +58,20 @@ def test_text_in_charts_is_large_enough_on_a_small_screen(browser: Page, page_fi
     assert min(sizes) >= 11
 
 
+def test_cells_of_the_summary_and_the_links_have_room(browser: Page, page_file: Path) -> None:
+    browser.open(page_file, width=400)
+    nav = browser.value("(u => [u.scrollWidth, u.clientWidth])(document.querySelector('nav ul'))")
+    assert nav[0] <= nav[1]
+    cells = "[...document.querySelectorAll('.stacked td[data-side]')]"
+    widths = browser.value(f"{cells}.map(c => c.getBoundingClientRect().width)")
+    assert all(width > 300 for width in widths)
+    named = browser.value(f"{cells}.map(c => getComputedStyle(c, '::before').content)")
+    assert all(text not in ("", "none") for text in named)
+    browser.open(page_file, width=1280)
+    named = browser.value(f"{cells}.map(c => getComputedStyle(c, '::before').content)")
+    assert set(named) <= {"none"}
+
+
 def test_maps_show_colours_and_the_bar_has_its_length(browser: Page, page_file: Path) -> None:
     browser.open(page_file)
     boxes = browser.value(

@@ -38,7 +38,8 @@ COMPARE = AlgorithmSpec(
     summary="Set layouts, and the real streets and parcels in the same land, side by side.",
     description=(
         "Measures each side as measure does and lists every figure for all of them, with the "
-        "difference from a reference and the better side where everybody would say the same. "
+        "difference from a reference and the better side by what is commonly wanted, such as "
+        "right angles and short detours; first it says where lands or densities are not the same. "
         "Distributions of areas, widths, lengths and bearings are held against each other: by "
         "Wasserstein's and Kolmogorov and Smirnov's distance, with bootstrap intervals, and with "
         "the distance that chance alone would make.\n\n"

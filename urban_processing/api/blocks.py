@@ -142,7 +142,6 @@ def subdivide(
         if streets is None and BLOCK_EDGES.name in blocks.made.names:
             streets = blocks.frame(BLOCK_EDGES.name)
         blocks = _without_nan(blocks.frame(BLOCKS.name))
-    usable = not SubdivideParams.problems_with(parameters)
     params, ground, before, processes = gathered(
         lambda: SubdivideParams.from_values(parameters),
         lambda: read_blocks(
@@ -151,7 +150,7 @@ def subdivide(
             layer=layer,
             where=where,
             crs=crs,
-            params=SubdivideParams.from_values(parameters) if usable else None,
+            params=SubdivideParams.usable(parameters),
         ),
         lambda: _previous(previous),
         lambda: _number_of_processes(processes),

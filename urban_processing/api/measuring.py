@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from os import PathLike
 from typing import Any
@@ -67,18 +67,22 @@ def measure(
     (2.0, 100.0)
     >>> found.report("report.html")  # doctest: +SKIP
     """
-    usable = None if MeasureParams.problems_with(parameters) else MeasureParams(**parameters)
     params, fabric = gathered(
         lambda: MeasureParams.from_values(parameters),
         lambda: read_fabric(
-            layout, parcels=parcels, streets=streets, land=land, crs=crs, params=usable
+            layout,
+            parcels=parcels,
+            streets=streets,
+            land=land,
+            crs=crs,
+            params=MeasureParams.usable(parameters),
         ),
     )
     return GeoFabric.of(pipeline.measure(fabric, params, progress))
 
 
 def compare(
-    *layouts: Measurable,
+    *layouts: Measurable | Mapping[str, Measurable],
     names: Sequence[str] = (),
     parcels: Source | None = None,
     streets: Source | None = None,
@@ -94,7 +98,7 @@ def compare(
     Parameters
     ----------
     *layouts
-        As in `measure`.
+        As in `measure`; or one mapping of names to them.
     names
         What the sides are called; by default as their files are.
     parcels, streets
@@ -130,7 +134,7 @@ def compare(
     >>> found.comparison[["metric", "difference"]]  # doctest: +SKIP
     """
     named = _named(layouts, names)
-    wrong = CompareParams.problems_with(parameters)
+    usable = CompareParams.usable(parameters)
     params, compared = gathered(
         lambda: CompareParams.from_values(parameters),
         lambda: read_compared(
@@ -141,17 +145,28 @@ def compare(
             osm_file=osm_file,
             osm=osm,
             crs=crs,
-            params=CompareParams() if wrong else CompareParams.from_values(parameters),
-            fetch=not wrong,
+            params=usable or CompareParams(),
+            fetch=usable is not None,
             progress=progress.slice(0.0, 0.3),
         ),
     )
     return GeoComparison.of(pipeline.compare_fabrics(compared, params, progress.slice(0.3, 1.0)))
 
 
-def _named(layouts: Sequence[Measurable], names: Sequence[str]) -> list[tuple[str, Measurable]]:
-    """Layouts with the names that were given to the first of them."""
+def _named(
+    layouts: Sequence[Measurable | Mapping[str, Measurable]], names: Sequence[str]
+) -> list[tuple[str, Measurable]]:
+    """Layouts with the names that were given to the first of them, or those of a mapping."""
     given = [names] if isinstance(names, str) else list(names)
+    plain = [each for each in layouts if not isinstance(each, Mapping)]
+    mappings = [each for each in layouts if isinstance(each, Mapping)]
+    if mappings and (len(layouts) > 1 or given):
+        raise ParameterError(
+            "Give either one mapping of names to layouts, or the layouts one by one and what "
+            "they are called as names=[...]."
+        )
+    if mappings:
+        return [(str(name), each) for name, each in mappings[0].items()]
     if len(given) > len(layouts):
         raise ParameterError(f"names has {len(given)} names for {len(layouts)} layout(s).")
-    return list(zip_longest(given, layouts, fillvalue=""))
+    return list(zip_longest(given, plain, fillvalue=""))

@@ -14,6 +14,7 @@ from urban_processing.blocks.noding import Centrelines
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.polygons import by_place, united_by_owner
 from urban_processing.params.blocks import BlocksParams
 from urban_processing.rights_of_way.centrelines import BESIDE, turning_heads
 from urban_processing.rights_of_way.partition import Cut, cut_out
@@ -97,18 +98,12 @@ def find_faces(
         edges = shapely.get_parts(shapely.union_all(np.append(lines, rims), grid_size=GRID))
         work = work.cut_at(edges)
     cells = shapely.get_parts(shapely.polygonize(edges))
-    cells = canonical_rings(cells[_by_place(cells)])
+    cells = canonical_rings(cells[by_place(cells)])
     if land is None:
         return work, Faces(cells, _connected(cells, lines), rims, edges)
     tree = shapely.STRtree(np.array(list(land), dtype=object))
     cell, part = tree.query(shapely.point_on_surface(cells), predicate="intersects")
     return work, Faces(cells[cell], part, rims, edges)
-
-
-def _by_place(polygons: Geometries) -> IntArray:
-    """The order of polygons by the lower left corner of their bounds, then their size."""
-    west, south, east, north = shapely.bounds(polygons).reshape(-1, 4).T
-    return np.lexsort((shapely.area(polygons), north, east, south, west))
 
 
 def _connected(cells: Geometries, lines: Geometries) -> IntArray:
@@ -198,19 +193,14 @@ def net_blocks(
     issues = _issues(cut, faces, loose, params)
     cut = cut.joined(loose)
     blocks, face = canonical_rings(cut.faces[cut.net]), cut.owner[cut.net]
-    order = _by_place(blocks)
+    order = by_place(blocks)
     order = order[np.argsort(faces.part[face[order]], kind="stable")]
     return NetBlocks(blocks[order], face[order], *cut.rights_of_way(faces.part)), issues
 
 
 def _roughly_net(faces: Geometries, surfaces: Surfaces) -> Geometries:
     """Polygons that street surfaces leave of faces, whose vertices may lie a hair beside theirs."""
-    order = np.argsort(surfaces.block, kind="stable")
-    block = surfaces.block[order]
-    start = np.flatnonzero(np.diff(block, prepend=-1))
-    groups = np.split(surfaces.regions[order], start[1:]) if len(order) else []
-    taken = np.full(len(faces), shapely.Polygon(), dtype=object)
-    taken[block[start]] = [shapely.union_all(group) for group in groups]
+    taken = united_by_owner(surfaces.regions, surfaces.block, len(faces))
     parts = shapely.get_parts(shapely.difference(faces, taken))
     return np.asarray(parts[shapely.get_dimensions(parts) == 2])
 

@@ -9,7 +9,9 @@ import shapely
 from urban_processing.blocks.model import rings_of
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.components import components
+from urban_processing.mesh.places import lower_end_first
 from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.polygons import by_place
 from urban_processing.site import GRID
 
 ObjectArray = npt.NDArray[np.object_]
@@ -64,15 +66,8 @@ def blocks_of(parcels: ObjectArray, *, gap: float) -> tuple[ObjectArray, IntArra
         made += len(own)
         pieces.append(own)
     blocks = canonical_rings(_apart(shapely.set_precision(np.concatenate(pieces), GRID)))
-    by_place = in_order_of_place(blocks)
-    return blocks[by_place], np.argsort(by_place)[block]
-
-
-def in_order_of_place(polygons: ObjectArray) -> IntArray:
-    """(n,) rows of polygons, from west to east, then south to north."""
-    west, south, east, north = np.round(shapely.bounds(polygons), 6).T
-    area = np.round(shapely.area(polygons), 6)
-    return np.lexsort((area, north, east, south, west))
+    order = by_place(blocks)
+    return blocks[order], np.argsort(order)[block]
 
 
 def _neighbours(parcels: ObjectArray, reach: float) -> IntArray:
@@ -97,11 +92,7 @@ def _of_one_edge(parcels: ObjectArray, least: float) -> IntArray:
     rings = rings_of(parcels)
     ends = np.stack([rings.xy, rings.xy[rings.following]], axis=1)
     long = np.hypot(*(ends[:, 1] - ends[:, 0]).T) > least
-    owner, ends = rings.edge_block[long], ends[long]
-    turned = (ends[:, 0, 0] > ends[:, 1, 0]) | (
-        (ends[:, 0, 0] == ends[:, 1, 0]) & (ends[:, 0, 1] > ends[:, 1, 1])
-    )
-    ends[turned] = ends[turned][:, ::-1]
+    owner, ends = rings.edge_block[long], lower_end_first(ends[long])
     order = np.lexsort((owner, *ends.reshape(-1, 4).T))
     same = (ends[order[1:]] == ends[order[:-1]]).all(axis=(1, 2))
     low, high = owner[order[:-1]][same], owner[order[1:]][same]
@@ -130,7 +121,7 @@ def _without_holes(polygon: shapely.Polygon, most: float) -> shapely.Polygon:
 def _apart(blocks: ObjectArray) -> ObjectArray:
     """Blocks less the smaller ones that lie in them: in a hole that was filled, or by a hair."""
     a, b = shapely.STRtree(blocks).query(blocks, predicate="intersects")
-    smaller = np.lexsort((in_order_of_place(blocks), np.round(shapely.area(blocks), 6)))
+    smaller = np.lexsort((by_place(blocks), np.round(shapely.area(blocks), 6)))
     rank = np.argsort(smaller)
     a, b = a[rank[a] > rank[b]], b[rank[a] > rank[b]]
     common = shapely.area(shapely.intersection(blocks[a], blocks[b])) > 0

@@ -5,17 +5,15 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from urban_processing.algorithms.choices import layout_problems
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind
 from urban_processing.errors import DependencyError, UrbanError
-from urban_processing.params.base import Params, option_name
+from urban_processing.params.base import option_name
 from urban_processing.params.compare import CompareParams
 from urban_processing.params.measure import MeasureParams
 from urban_processing.params.subdivide import SubdivideParams
-
-P = TypeVar("P", bound=Params)
 
 Reader = Callable[[AlgorithmSpec, Input, Mapping[str, Any], list[str]], Any]
 """Reads an input from what was given; adds to the list what is wrong with it, and returns None
@@ -173,7 +171,7 @@ def _read_blocks(
         layer=given["layer"],
         where=given["where"],
         crs=given["crs"],
-        params=_usable(SubdivideParams, values_given(spec, given)),
+        params=SubdivideParams.usable(values_given(spec, given)),
     )
 
 
@@ -234,7 +232,7 @@ def _read_fabric(
         streets=streets,
         land=land,
         crs=given["crs"],
-        params=_usable(MeasureParams, values_given(spec, given)),
+        params=MeasureParams.usable(values_given(spec, given)),
     )
 
 
@@ -261,7 +259,7 @@ def _read_fabrics(
         osm_file=given["osm_file"],
         osm=given["osm"],
         crs=given["crs"],
-        params=_usable(CompareParams, values_given(spec, given)) or CompareParams(),
+        params=CompareParams.usable(values_given(spec, given)) or CompareParams(),
         fetch=not problems,  # no call over the network for a run that cannot begin
     )
 
@@ -282,11 +280,6 @@ def named_file(text: str) -> tuple[str, str]:
     if not sign or Path(text).exists() or "|" in name or "/" in name:
         return "", text
     return name.strip(), path
-
-
-def _usable(params: type[P], values: Mapping[str, Any]) -> P | None:
-    """The parameters that bounds in layers are checked against; None where they are wrong."""
-    return None if params.problems_with(values) else params.from_values(values)
 
 
 def values_given(spec: AlgorithmSpec, given: Mapping[str, Any]) -> dict[str, Any]:

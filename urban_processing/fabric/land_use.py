@@ -12,6 +12,7 @@ from urban_processing.blocks.net import street_sides
 from urban_processing.blocks.noding import Centrelines
 from urban_processing.fabric.streets_in_land import StreetsInLand
 from urban_processing.mesh.planar import FloatArray, IntArray
+from urban_processing.mesh.polygons import united_by_owner
 from urban_processing.rights_of_way.surfaces import Circles, StreetSides, street_surfaces
 from urban_processing.site import GRID
 
@@ -52,7 +53,7 @@ def nominal_street_land(ground: StreetsInLand) -> Geometries:
         Circles(none.astype(np.int64), none.reshape(0, 2), none, none.astype(np.int64)),
         corner_radius=0.0,
     )
-    taken = _united(surfaces.regions, surfaces.block, len(faces.polygons))
+    taken = united_by_owner(surfaces.regions, surfaces.block, len(faces.polygons))
     return _areal(shapely.intersection(faces.polygons, taken))
 
 
@@ -103,17 +104,6 @@ def net_street_land(
     part = np.zeros(len(left), dtype=np.int64)
     part[at[::-1]] = of[::-1]
     return StreetLand(left, part, area)
-
-
-def _united(polygons: Geometries, owner: IntArray, n: int) -> Geometries:
-    """(n,) union of the polygons of each owner."""
-    out = np.full(n, shapely.Polygon(), dtype=object)
-    order = np.argsort(owner, kind="stable")
-    found, first = np.unique(owner[order], return_index=True)
-    groups = np.split(polygons[order], first[1:])
-    for k, group in zip(found.tolist(), groups, strict=False):
-        out[k] = shapely.union_all(group)
-    return out
 
 
 def _areal(geometries: Geometries) -> Geometries:

@@ -115,6 +115,11 @@ class FabricParcels:
     neighbours: IntArray
     fronts: Fronts
 
+    @property
+    def frontage_known(self) -> bool:
+        """Whether streets are known: else frontage, and what depends on it, is not."""
+        return not bool(np.isnan(self.rings.frontage).any())
+
     def __len__(self) -> int:
         """Return the number of parcels."""
         return len(self.parcel_id)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ from urban_processing.blocks.noding import Centrelines
 from urban_processing.layout import PARCEL_USE
 from urban_processing.mesh.build import canonical_rings
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
+from urban_processing.mesh.polygons import united_by_owner
 from urban_processing.site import Frame, Issue
 
 Geometries = npt.NDArray[np.object_]
@@ -55,6 +57,14 @@ class ObservedParcels:
     def __len__(self) -> int:
         """Return the number of parcels."""
         return len(self.polygons)
+
+    @cached_property
+    def union(self) -> shapely.Geometry:
+        """The land that they cover."""
+        # uniting a valid coverage is faster, and only right, where its boundaries match
+        covers = shapely.coverage_is_valid(self.polygons)
+        unite = shapely.coverage_union_all if covers else shapely.union_all
+        return unite(self.polygons)
 
     def take(self, rows: IntArray | BoolArray) -> ObservedParcels:
         """Return some of the parcels."""
@@ -112,16 +122,8 @@ def street_parcels(
 
 def _covered(polygons: Geometries, lines: Geometries, width: FloatArray) -> FloatArray:
     """(n,) area in m² of each polygon that lines of some width cover."""
-    out = np.zeros(len(polygons))
-    if not len(polygons):
-        return out
     strips = shapely.buffer(lines, width / 2, quad_segs=4)
     polygon, strip = shapely.STRtree(strips).query(polygons, predicate="intersects")
     order = np.lexsort((strip, polygon))
-    found, first = np.unique(polygon[order], return_index=True)
-    covers = np.array(
-        [shapely.union_all(group) for group in np.split(strips[strip[order]], first[1:])],
-        dtype=object,
-    )
-    out[found] = shapely.area(shapely.intersection(polygons[found], covers))
-    return out
+    covers = united_by_owner(strips[strip[order]], polygon[order], len(polygons))
+    return np.asarray(shapely.area(shapely.intersection(polygons, covers)))

@@ -23,6 +23,7 @@ from urban_processing.fabric.model import (
 from urban_processing.fabric.observed import ObservedParcels, street_parcels
 from urban_processing.fabric.outline import town_outline
 from urban_processing.fabric.streets_in_land import StreetsInLand, streets_in_land
+from urban_processing.mesh.planar import FloatArray
 from urban_processing.params.measure import MeasureParams
 from urban_processing.site import Frame, Issue
 from urban_processing.streets.classes import NodeKind
@@ -89,7 +90,6 @@ class _Reading:
     given: Sequence[shapely.Polygon] | None
     params: MeasureParams
     issues: list[Issue] = field(default_factory=list)
-    _united: tuple[Geometries, shapely.Geometry] | None = None
 
     def fabric(self) -> Fabric:
         """Return the fabric."""
@@ -126,15 +126,6 @@ class _Reading:
             right_of_way_part=None if taken is None else taken.part,
             issues=tuple(self.issues),
         )
-
-    def _union(self, polygons: Geometries) -> shapely.Geometry:
-        """The union of parcels, kept for the next that asks for that of the same ones."""
-        if self._united is None or len(self._united[0]) != len(polygons):
-            # uniting a valid coverage is faster, and only right, where its boundaries match
-            covers = shapely.coverage_is_valid(polygons)
-            unite = shapely.coverage_union_all if covers else shapely.union_all
-            self._united = polygons, unite(polygons)
-        return self._united[1]
 
     def _centrelines(self) -> tuple[StreetLines, Centrelines]:
         """Lines near the land or the parcels with their widths, and their segments, mended."""
@@ -189,7 +180,7 @@ class _Reading:
         if parcels is not None:
             land = town_outline(
                 parcels.polygons,
-                self._union(parcels.polygons),
+                parcels.union,
                 (work, lines.width[work.line]),
                 reach=self.params.street_reach,
             )
@@ -277,7 +268,7 @@ class _Reading:
         known, gross = describe_parcels(
             parcels, ground, self.params, streets_known=self.streets is not None
         )
-        self._tell_of_overlaps(known)
+        self._tell_of_overlaps(parcels, known.rings.area)
         if self.streets is None:
             return known, None
         if gross:
@@ -290,16 +281,16 @@ class _Reading:
         else:
             taken = net_street_land(
                 ground,
-                self._union(parcels.polygons),
+                parcels.union,
                 known.rings.area,
                 roads,
                 reach=self.params.street_reach,
             )
         return replace(known, net_area=taken.net_area), taken
 
-    def _tell_of_overlaps(self, parcels: FabricParcels) -> None:
-        total = float(parcels.rings.area.sum())
-        twice = total - float(shapely.area(self._union(parcels.rings.polygons)))
+    def _tell_of_overlaps(self, parcels: ObservedParcels, area: FloatArray) -> None:
+        total = float(area.sum())
+        twice = total - float(shapely.area(parcels.union))
         if twice > OVERLAP_SHARE * total:
             message = f"Parcels overlap: {twice:.0f} m² of them are there twice or more."
             self.issues.append(Issue("parcels_overlap", message, value=twice))

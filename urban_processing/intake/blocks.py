@@ -21,7 +21,7 @@ from urban_processing.intake.block_values import BLOCK_ID, block_values
 from urban_processing.intake.crs_choice import CrsLibrary
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import layers_digest
-from urban_processing.intake.numbers import numbered
+from urban_processing.intake.numbers import is_whole, numbered
 from urban_processing.intake.polygons import CleanedEach, clean_each
 from urban_processing.intake.projection import Projection
 from urban_processing.intake.street_lines import (
@@ -46,9 +46,6 @@ HAIR = 0.1
 
 TRIFLE = 1e-3
 """So do those below this share of the smaller block."""
-
-_TOO_LARGE = 2**62
-"""Numbers of blocks stay below, so that new ones fit above them."""
 
 _NEED = (
     "Blocks must be polygons: the algorithm blocks finds those between lines of streets; closed "
@@ -184,10 +181,8 @@ def _block_ids(features: Features[Any], rows: IntArray) -> tuple[IntArray | None
     out = np.zeros(len(values), dtype=np.int64)
     bad = []
     for row in rows.tolist():
-        value = values[row]
-        whole = isinstance(value, int | float | np.number) and float(value).is_integer()
-        if whole and abs(value) < _TOO_LARGE:
-            out[row] = int(value)
+        if is_whole(values[row]):
+            out[row] = int(values[row])
         else:
             bad.append(row)
     if bad:

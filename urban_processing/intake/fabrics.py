@@ -19,7 +19,7 @@ from urban_processing.fabric.of_layers import fabric_of_layers
 from urban_processing.intake.crs_choice import CrsLibrary, crs_label
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import USE_COLUMNS, layers_digest, text, wrong_kind
-from urban_processing.intake.numbers import numbered
+from urban_processing.intake.numbers import is_whole, numbered
 from urban_processing.intake.polygons import CleanedEach, clean_each
 from urban_processing.intake.projection import Projection
 from urban_processing.intake.sites import build_site
@@ -294,13 +294,9 @@ def _given_numbers(features: Features[Any], row: IntArray) -> IntArray | None:
         return None
     out = np.zeros(len(values), dtype=np.int64)
     for i in np.unique(row).tolist():
-        value = values[i]
-        if not isinstance(value, int | float | np.number) or isinstance(value, bool):
+        if not is_whole(values[i]):
             return None
-        number = float(value)
-        if not number.is_integer() or abs(number) >= 2**53:
-            return None
-        out[i] = int(number)
+        out[i] = int(values[i])
     known = out[np.unique(row)]
     return out if len(np.unique(known)) == len(known) else None
 

@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import shapely
 
 from urban_processing.mesh.planar import IntArray
+from urban_processing.mesh.polygons import by_place
+
+TOO_LARGE = 2**62
+"""Numbers stay below, so that new ones fit above them."""
+
+
+def is_whole(value: Any) -> bool:
+    """Whether an attribute is a whole number that can be that of a polygon.
+
+    >>> [is_whole(value) for value in (7, 7.0, 7.5, float("nan"), "7", None, True, 2**62)]
+    [True, True, False, False, False, False, False, False]
+    """
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
+        return False
+    return float(value).is_integer() and abs(int(value)) < TOO_LARGE
 
 
 def numbered(
@@ -31,16 +48,15 @@ def numbered(
     extra
         How many polygons there are beyond one for each row.
     """
-    west, south, east, north = shapely.bounds(polygons).T
-    by_place = np.lexsort((shapely.area(polygons), north, east, south, west))
-    size = np.round(shapely.area(polygons[by_place]), 6)
-    largest = by_place[np.lexsort((np.arange(len(size)), -size, row[by_place]))]
+    placed = by_place(polygons)
+    size = np.round(shapely.area(polygons[placed]), 6)
+    largest = placed[np.lexsort((np.arange(len(size)), -size, row[placed]))]
     _, first = np.unique(row[largest], return_index=True)
     extra = len(polygons) - len(first)
     if given_id is None:
-        return np.arange(1, len(polygons) + 1), by_place, extra
-    keeps = np.isin(by_place, largest[first])
-    number = np.where(keeps, given_id[row[by_place]], 0)
+        return np.arange(1, len(polygons) + 1), placed, extra
+    keeps = np.isin(placed, largest[first])
+    number = np.where(keeps, given_id[row[placed]], 0)
     number[~keeps] = max(0, int(given_id[row].max())) + 1 + np.arange(extra)
     order = np.argsort(number, kind="stable")
-    return number[order], by_place[order], extra
+    return number[order], placed[order], extra

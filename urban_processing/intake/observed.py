@@ -11,7 +11,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.blocks.model import Blocks
-from urban_processing.calibration.grouping import in_order_of_place, same_as_others
+from urban_processing.calibration.grouping import same_as_others
 from urban_processing.calibration.layers import BOUNDS
 from urban_processing.calibration.model import Observed
 from urban_processing.errors import BoundaryError
@@ -19,10 +19,12 @@ from urban_processing.intake.blocks import build_blocks, local_pieces
 from urban_processing.intake.crs_choice import CrsLibrary, crs_label
 from urban_processing.intake.features import Features
 from urban_processing.intake.given import layers_digest
+from urban_processing.intake.numbers import is_whole
 from urban_processing.intake.polygons import clean_each
 from urban_processing.intake.projection import Projection
 from urban_processing.intake.working import source_crs, working_crs
 from urban_processing.mesh.planar import IntArray
+from urban_processing.mesh.polygons import by_place
 from urban_processing.site import Frame, Issue
 
 C = TypeVar("C")
@@ -134,7 +136,7 @@ def _each_once(
     parcels: ObjectArray, row: IntArray, issues: list[Issue]
 ) -> tuple[ObjectArray, IntArray]:
     """Put parcels in order of place, without those that are there twice; say what overlaps."""
-    order = in_order_of_place(parcels)
+    order = by_place(parcels)
     parcels, row = parcels[order], row[order]
     large = shapely.area(parcels) >= LEAST_AREA
     if not large.any():
@@ -163,16 +165,9 @@ def _each_once(
 def _numbers(features: Features[Any], row: IntArray) -> IntArray:
     """(n,) numbers of the parcels in their column, or of their features where it has no such."""
     values = features.columns.get(PARCEL_ID)
-    if values is not None and all(_is_whole(values[k]) for k in np.unique(row).tolist()):
+    if values is not None and all(is_whole(values[k]) for k in np.unique(row).tolist()):
         return np.array([int(values[k]) for k in row.tolist()], dtype=np.int64)
     return row + 1
-
-
-def _is_whole(value: Any) -> bool:
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
-        return False
-    number = float(value)
-    return number.is_integer() and abs(number) < 2.0**62
 
 
 def _blocks_in(

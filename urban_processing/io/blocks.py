@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from os import PathLike, fspath
-
-import pyproj
+from os import PathLike
 
 from urban_processing.blocks.model import Blocks
 from urban_processing.blocks.streets import StreetsOnLand
-from urban_processing.errors import BoundaryError
 from urban_processing.intake.block_values import block_columns
 from urban_processing.intake.blocks import build_blocks
-from urban_processing.intake.features import Features
 from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
 from urban_processing.io.crs import PYPROJ, asked_crs
-from urban_processing.io.features import Source, read_features
-from urban_processing.io.layouts import layer_in
+from urban_processing.io.features import Source, split_layer_name
+from urban_processing.io.layers import layer_in, read_layer
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.schema import BLOCK_EDGES, BLOCKS
 
@@ -50,8 +45,16 @@ def read_streets(
     """
     problems: list[str] = []
     asked = asked_crs(crs, problems)
-    lines = _read(source, "Streets", "line", STREET_COLUMNS, problems, layer=layer, where=where)
-    ground = None if land is None else _read(land, "Land", "polygon", (), problems)
+    lines = read_layer(
+        "Streets",
+        source,
+        problems,
+        layer=layer,
+        where=where,
+        kind="line",
+        columns=STREET_COLUMNS,
+    )
+    ground = None if land is None else read_layer("Land", land, problems, columns=())
     return build_streets(lines, library=PYPROJ, asked=asked, land=ground, problems=problems)
 
 
@@ -90,14 +93,18 @@ def read_blocks(
     asked = asked_crs(crs, problems)
     if streets is None:
         streets = _own_edges(source)
-    if layer is None:
-        layer = layer_in(source, BLOCKS.name)
-    polygons = _read(
-        source, "Blocks", "polygon", block_columns(), problems, layer=layer, where=where
+    polygons = read_layer(
+        "Blocks",
+        source,
+        problems,
+        usual=BLOCKS.name,
+        layer=layer,
+        where=where,
+        columns=block_columns(),
     )
     lines = None
     if streets is not None:
-        lines = _read(streets, "Streets", "line", STREET_COLUMNS, problems)
+        lines = read_layer("Streets", streets, problems, kind="line", columns=STREET_COLUMNS)
     return build_blocks(
         polygons, library=PYPROJ, asked=asked, streets=lines, params=params, problems=problems
     )
@@ -107,27 +114,6 @@ def _own_edges(source: Source) -> str | None:
     """The layer of edges in a file of blocks, as a source of its own; None where it has none."""
     if not isinstance(source, str | PathLike):
         return None
-    path = fspath(source).partition("|layername=")[0]
+    path, _ = split_layer_name(source)
     edges = layer_in(path, BLOCK_EDGES.name)
     return None if edges is None else f"{path}|layername={edges}"
-
-
-def _read(
-    source: Source,
-    name: str,
-    kind: str,
-    columns: Sequence[str],
-    problems: list[str],
-    *,
-    layer: str | None = None,
-    where: str | None = None,
-) -> Features[pyproj.CRS] | None:
-    """Read a layer; None where that failed, and why is added to `problems`."""
-    if layer is None and isinstance(source, str | PathLike):
-        path, _, named = fspath(source).partition("|layername=")
-        source, layer = path, named or None
-    try:
-        return read_features(source, layer=layer, where=where, kind=kind, columns=columns)
-    except BoundaryError as error:
-        problems += [f"{name}: {problem}" for problem in error.problems]
-        return None

@@ -8,7 +8,7 @@ from urban_processing.errors import BoundaryError
 from urban_processing.intake.editions import EditionLayers, build_editions
 from urban_processing.io.crs import PYPROJ
 from urban_processing.io.features import Source, read_features, split_layer_name
-from urban_processing.io.layouts import layer_in
+from urban_processing.io.layers import layer_in
 from urban_processing.persistence.editions import Editions
 from urban_processing.schema import BLOCK_ID, PARCELS, STREETS
 

@@ -10,14 +10,12 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import pyogrio
-import pyproj
 import shapely
 from pyogrio.errors import DataSourceError
 
 from urban_processing.errors import BoundaryError
 from urban_processing.fabric.model import Fabric
 from urban_processing.intake.fabrics import PARCEL_COLUMNS, build_fabric
-from urban_processing.intake.features import Features
 from urban_processing.intake.street_lines import STREET_COLUMNS
 from urban_processing.io.crs import PYPROJ, asked_crs
 from urban_processing.io.features import (
@@ -30,7 +28,7 @@ from urban_processing.io.features import (
 )
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers
-from urban_processing.io.layouts import layer_in
+from urban_processing.io.layers import read_layer
 from urban_processing.io.measured import GeoFabric
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import as_written
@@ -95,17 +93,25 @@ def read_fabric(
     problems: list[str] = []
     asked = asked_crs(crs, problems)
     read = {
-        name: _read(given.get(name), name, kind, layer, columns, problems)
-        for name, kind, layer, columns in (
+        name: read_layer(
+            name.capitalize(), layers, problems, usual=usual, kind=kind, columns=columns
+        )
+        for name, kind, usual, columns in (
             ("parcels", "polygon", PARCELS.name, PARCEL_COLUMNS),
             ("streets", "line", STREETS.name, STREET_COLUMNS),
             ("land", "polygon", BOUNDARY.name, ()),
         )
+        if (layers := given.get(name)) is not None
     }
     if problems:
         raise BoundaryError(problems)
     fabric = build_fabric(
-        read["parcels"], read["streets"], read["land"], library=PYPROJ, asked=asked, params=params
+        read.get("parcels"),
+        read.get("streets"),
+        read.get("land"),
+        library=PYPROJ,
+        asked=asked,
+        params=params,
     )
     return replace(fabric, name=source_name(first))
 
@@ -209,6 +215,13 @@ def _of_file(path: str, given: dict[str, Source | None]) -> dict[str, Source | N
             f"{path} cannot be read: it is no layout file, and no other file with layers that GDAL "
             "knows, or it is damaged."
         ) from error
+    return _of_kinds(path, layers, given)
+
+
+def _of_kinds(
+    path: str, layers: Sequence[tuple[str, str | None]], given: dict[str, Source | None]
+) -> dict[str, Source | None]:
+    """Layers of a file by their names, else the only ones with polygons and with lines."""
     found: dict[str, Source | None] = {}
     problems = []
     for name, layer, geometry in (
@@ -250,22 +263,3 @@ def _nothing(given: dict[str, Source | None]) -> bool:
 def _of_one_layer(path: str, given: dict[str, Source | None]) -> dict[str, Source | None]:
     """A file of a single layer: the parcels, unless these are given."""
     return {"streets": path} if given["parcels"] is not None else {"parcels": path}
-
-
-def _read(
-    source: Source | None,
-    name: str,
-    kind: str,
-    named: str,
-    columns: Sequence[str],
-    problems: list[str],
-) -> Features[pyproj.CRS] | None:
-    """Read a layer; None where there is none or that failed, and why is added to `problems`."""
-    if source is None:
-        return None
-    path, layer = split_layer_name(source)
-    try:
-        return read_features(path, layer=layer or layer_in(path, named), kind=kind, columns=columns)
-    except BoundaryError as error:
-        problems += [f"{name.capitalize()}: {problem}" for problem in error.problems]
-        return None

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from os import PathLike, fspath
-from pathlib import Path
-
-import pyogrio
-from pyogrio.errors import DataSourceError
-
 from urban_processing.errors import BoundaryError
 from urban_processing.intake.layouts import build_layout
 from urban_processing.io.crs import PYPROJ
-from urban_processing.io.features import Source, read_features, split_layer_name
+from urban_processing.io.features import Source
+from urban_processing.io.layers import read_layer
 from urban_processing.layout import Layout
 from urban_processing.schema import PARCELS, STREETS
 
@@ -38,28 +33,8 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
         With everything that is wrong with the layers.
     """
     problems: list[str] = []
-    found = []
-    for called, source, layer, kind in (
-        ("Parcels", parcels, PARCELS, "polygon"),
-        ("Streets", streets, STREETS, "line"),
-    ):
-        path, named = split_layer_name(source)
-        chosen = named or layer_in(path, layer.name)
-        try:
-            found.append(read_features(path, layer=chosen, kind=kind))
-        except BoundaryError as error:
-            problems += [f"{called}: {problem}" for problem in error.problems]
-    if problems:
+    polygons = read_layer("Parcels", parcels, problems, usual=PARCELS.name, columns=())
+    lines = read_layer("Streets", streets, problems, usual=STREETS.name, kind="line", columns=())
+    if polygons is None or lines is None:
         raise BoundaryError(problems)
-    return build_layout(*found, library=PYPROJ, snap=snap)
-
-
-def layer_in(source: Source, name: str) -> str | None:
-    """Return the name of a layer if a source is a file that has it, else None."""
-    if not isinstance(source, str | PathLike) or not Path(source).is_file():
-        return None
-    try:
-        layers = pyogrio.list_layers(fspath(source))[:, 0].tolist()
-    except DataSourceError:
-        return None  # reading it says what is wrong
-    return name if name in layers else None
+    return build_layout(polygons, lines, library=PYPROJ, snap=snap)

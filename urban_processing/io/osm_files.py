@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import lzma
+import math
 import tempfile
 import zlib
 from pathlib import Path
@@ -92,7 +93,7 @@ def _read_xml(path: Path, raw: IO[bytes], head: bytes, progress: Progress) -> Os
             parser.feed(chunk)
             progress.update(raw.tell() / size, "Reading streets")
         parser.close()
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: its encoding
         why = f"it is no XML, or damaged ({error})"
         raise BoundaryError(_CANNOT.format(path=path, why=why)) from error
     except _Foreign as error:
@@ -130,15 +131,15 @@ class _Parser:
     def _start(self, name: str, values: dict[str, str]) -> None:
         if name == "node":
             if "lon" in values and not _is_deleted(values):
-                self._nodes[values["id"]] = _position(values)
+                self._nodes[_needed(values, "id", name)] = _position(values)
         elif name == "way":
             self._refs = None if _is_deleted(values) else []
             self._tags = {}
         elif self._refs is not None:
             if name == "nd":
-                self._refs.append(values["ref"])
-            elif name == "tag" and values["k"] in TAGS:
-                self._tags[values["k"]] = values["v"]
+                self._refs.append(_needed(values, "ref", name))
+            elif name == "tag" and _needed(values, "k", name) in TAGS:
+                self._tags[values["k"]] = _needed(values, "v", name)
 
     def _end(self, name: str) -> None:
         if name == "way":
@@ -170,11 +171,21 @@ def _is_deleted(values: dict[str, str]) -> bool:
     return values.get("visible") == "false" or values.get("action") == "delete"
 
 
+def _needed(values: dict[str, str], key: str, element: str) -> str:
+    """An attribute without which an element means nothing."""
+    if key not in values:
+        raise _Foreign(f"a <{element}> has no {key}")
+    return values[key]
+
+
 def _position(values: dict[str, str]) -> tuple[float, float]:
     try:
-        return float(values["lon"]), float(values["lat"])
+        at = float(values["lon"]), float(values["lat"])
     except (KeyError, ValueError) as error:
         raise _Foreign(f"node {values.get('id')} has no usable lon and lat") from error
+    if not all(map(math.isfinite, at)):
+        raise _Foreign(f"node {values.get('id')} has no usable lon and lat")
+    return at
 
 
 _CONFIG = f"""closed_ways_are_polygons=

@@ -11,6 +11,8 @@ import shapely
 
 from urban_processing.intake.osm_lines import HIGHWAY
 from urban_processing.io.osm_ways import CLASSES, KEPT_TAGS, NAME
+from urban_processing.mesh.components import components
+from urban_processing.mesh.places import line_segments, lower_end_first
 from urban_processing.site import FloatArray, snap_to_grid
 
 Lines: TypeAlias = npt.NDArray[np.object_]
@@ -39,16 +41,9 @@ def segments_of(lines: Lines) -> tuple[FloatArray, npt.NDArray[np.int64]]:
 
     Segments without length are left out.
     """
-    xy, of = shapely.get_coordinates(lines, return_index=True)
-    along = np.flatnonzero(of[:-1] == of[1:])
-    pairs = np.stack([xy[along], xy[along + 1]], axis=1)
-    row = of[along]
+    pairs, row = line_segments(lines)
     long = (pairs[:, 0] != pairs[:, 1]).any(axis=1)
-    pairs, row = pairs[long], row[long]
-    (x0, y0), (x1, y1) = pairs[:, 0].T, pairs[:, 1].T
-    turned = (x0 > x1) | ((x0 == x1) & (y0 > y1))
-    pairs[turned] = pairs[turned, ::-1]
-    return pairs, np.asarray(row, dtype=np.int64)
+    return lower_end_first(pairs[long]), row[long]
 
 
 def network_edges(lines: Lines) -> Lines:
@@ -91,15 +86,8 @@ def ends_of(edges: Lines) -> FloatArray:
 
 def pieces_of(edges: Lines) -> int:
     """Count the pieces of a network that no edge connects."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     places, node = np.unique(ends_of(edges).reshape(-1, 2), axis=0, return_inverse=True)
-    start, end = node.reshape(-1, 2).T
-    shape = (len(places), len(places))
-    graph = coo_array((np.ones(len(start)), (start, end)), shape=shape)
-    count, _ = connected_components(graph, directed=False)
-    return int(count)
+    return len(np.unique(components(len(places), node.reshape(-1, 2))))
 
 
 def intersections_of(edges: Lines) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from urban_processing.errors import OutputError
 from urban_processing.layout_file.geopackage import LAYERS_STATE, LayerLibrary, write_geopackage
-from urban_processing.paths import geopackage_problems
+from urban_processing.paths import geopackage_problems, replaced_problems
 from urban_processing.tables import LayerSet
 
 FILE_FORMAT = 1
@@ -24,13 +24,7 @@ def check_output(path: str | PathLike[str], *, overwrite: bool = False) -> list[
     Meant to be asked before a long run.
     """
     target = Path(path)
-    problems = geopackage_problems(target)
-    if target.is_file() and not overwrite:
-        problems.append(
-            f"The output {target} exists already: choose another name, or allow overwriting "
-            "(--overwrite)."
-        )
-    return problems
+    return [*geopackage_problems(target), *replaced_problems(target, overwrite=overwrite)]
 
 
 def write_layer_set(

@@ -10,6 +10,7 @@ import shapely
 from urban_processing.fabric.model import Fabric
 from urban_processing.mesh.planar import BoolArray
 from urban_processing.metrics.averages import highest, in_part, lowest, mean, percent
+from urban_processing.metrics.land_values import land_area
 from urban_processing.streets.block_length import BlockSides
 
 SMALL_BLOCK = 3
@@ -25,7 +26,7 @@ def block_values(fabric: Fabric, sides: BlockSides | None, part: int | None) -> 
     length = sides.length[inside]
     area = shapely.area(blocks.polygons[inside])
     perimeter = shapely.length(blocks.polygons[inside])
-    land = float(shapely.area(fabric.land[in_part(fabric.land_part, part)]).sum())
+    land = land_area(fabric, part)
     return {
         **_parcels_in_blocks(fabric, inside),
         "blocks": int(inside.sum()),

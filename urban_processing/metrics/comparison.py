@@ -132,6 +132,9 @@ class Comparison:
         but the reference.
     resampling
         How intervals and noise were found.
+    shared_land
+        Part of its land that each side shares with the reference, NaN where their coordinate
+        systems differ; nothing where lands were not looked at.
     """
 
     sides: tuple[Side, ...]
@@ -139,6 +142,7 @@ class Comparison:
     rows: tuple[MetricRow, ...]
     distances: tuple[DistributionDistance, ...]
     resampling: Resampling
+    shared_land: tuple[float, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -158,6 +162,7 @@ def compare(
     seed: int = 0,
     resamples: int = RESAMPLES,
     confidence: float = 0.95,
+    shared_land: Sequence[float] = (),
 ) -> Comparison:
     """Hold layouts against each other.
 
@@ -174,6 +179,9 @@ def compare(
         Times that samples are drawn again.
     confidence
         Share of cases in which an interval is to hold the true distance.
+    shared_land
+        Part of its land that each side shares with the reference, NaN where their coordinate
+        systems differ; by default lands are not looked at, but for their areas.
 
     Raises
     ------
@@ -181,7 +189,8 @@ def compare(
         If there are fewer than two sides, or none has the name of the reference, or a number is
         out of range.
     ValueError
-        If a side has a metric or distribution that is not declared.
+        If a side has a metric or distribution that is not declared, or the lands are not as many
+        as the sides.
     """
     how = Resampling(seed=seed, resamples=resamples, confidence=confidence)
     if len(sides) < 2:
@@ -194,12 +203,15 @@ def compare(
         )
     chosen = 0 if reference is None else names.index(reference)
     _check_declared(named)
+    if len(shared_land) not in (0, len(named)):
+        raise ValueError(f"There are {len(shared_land)} shared lands for {len(named)} sides.")
     return Comparison(
         sides=named,
         reference=names[chosen],
         rows=_rows(named, chosen),
         distances=_distances(named, chosen, how),
         resampling=how,
+        shared_land=tuple(shared_land),
     )
 
 

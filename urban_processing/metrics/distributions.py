@@ -200,6 +200,11 @@ class Sample:
         return len(self.values)
 
     @property
+    def mean(self) -> float:
+        """The mean, weighted where there are weights; NaN of nothing."""
+        return float(np.average(self.values, weights=self.weights)) if len(self) else float("nan")
+
+    @property
     def median(self) -> float:
         """The median, weighted where there are weights; NaN of nothing."""
         if not len(self):

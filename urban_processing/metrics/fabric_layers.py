@@ -136,7 +136,7 @@ def _summary(known: FabricMeasures) -> list[tuple[str, str]]:
 
 
 def _unreached(parcels: float) -> str:
-    return "" if math.isnan(parcels) else f", {parcels:,.0f} without a street"
+    return "" if math.isnan(parcels) else f", {parcels:,.0f} with too little frontage for access"
 
 
 def _count(number: float, what: str) -> str:

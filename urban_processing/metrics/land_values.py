@@ -29,6 +29,11 @@ OTHER_USES = frozenset(
 """Land uses that are neither parks nor parcels to live on."""
 
 
+def land_area(fabric: Fabric, part: int | None) -> float:
+    """Area of the land in m², of the whole or of one part."""
+    return float(shapely.area(fabric.land[in_part(fabric.land_part, part)]).sum())
+
+
 def land_values(fabric: Fabric, part: int | None) -> dict[str, float]:
     """Metrics of the land of the whole, or of one part."""
     land = fabric.land[in_part(fabric.land_part, part)]
@@ -37,7 +42,7 @@ def land_values(fabric: Fabric, part: int | None) -> dict[str, float]:
     made = level[level != UNKNOWN_LEVEL]
     return {
         "perimeter_m": float(shapely.length(land).sum()),
-        "area_m2": float(shapely.area(land).sum()),
+        "area_m2": land_area(fabric, part),
         "min_area_m2": fabric.min_area,
         "deepest_level": float(made.max()) if len(made) else math.nan,
         **_land_uses(fabric, part),
@@ -49,7 +54,7 @@ def _land_uses(fabric: Fabric, part: int | None) -> dict[str, float]:
     streets, street_part, parcels = fabric.right_of_way, fabric.right_of_way_part, fabric.parcels
     if streets is None or street_part is None:
         return {}
-    land = float(shapely.area(fabric.land[in_part(fabric.land_part, part)]).sum())
+    land = land_area(fabric, part)
     taken = float(shapely.area(streets[in_part(street_part, part)]).sum())
     values = {
         "right_of_way_m2": taken,

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import shapely
 
 from urban_processing.fabric.model import Fabric
 from urban_processing.fabric.of_layout import fabric_of_layout
@@ -16,13 +15,14 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.metrics.averages import in_part
 from urban_processing.metrics.block_values import block_values
-from urban_processing.metrics.land_values import land_values
+from urban_processing.metrics.land_values import land_area, land_values
 from urban_processing.metrics.parcel_values import parcel_values
 from urban_processing.metrics.parcels import ParcelMeasures, measure_parcels, measure_rings
 from urban_processing.metrics.registry import INTERIOR, METRICS
 from urban_processing.metrics.routes import Routes
 from urban_processing.metrics.segments import Segments, segments
 from urban_processing.metrics.street_values import street_values
+from urban_processing.provenance import Step
 from urban_processing.rights_of_way import RightsOfWay, lay_out_rights_of_way
 from urban_processing.streets.block_length import BlockSides, longest_sides
 from urban_processing.streets.network import street_network
@@ -86,6 +86,12 @@ class FabricMeasures:
     def metrics(self) -> tuple[Metric, ...]:
         """Every metric of the registry; see `measure_fabric`."""
         return measure_fabric(self)
+
+    def with_history(self, history: tuple[Step, ...]) -> FabricMeasures:
+        """Return these measures under another history of the fabric; none is worked out again."""
+        told = FabricMeasures(replace(self.fabric, history=history))
+        told.__dict__.update({k: v for k, v in self.__dict__.items() if k != "fabric"})
+        return told
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -216,7 +222,7 @@ def _of_parcels(known: FabricMeasures, part: int | None) -> dict[str, float]:
     if parcels is None or measures is None:
         return {"parcels": math.nan}
     inside = in_part(parcels.part, part)
-    land = float(shapely.area(known.fabric.land[in_part(known.fabric.land_part, part)]).sum())
+    land = land_area(known.fabric, part)
     values: dict[str, float] = {}
     for suffix, chosen in (("", inside), (INTERIOR, inside & ~measures.rim)):
         found = {

@@ -48,9 +48,9 @@ def parcel_values(
         "irregularity_mean": mean(irregularity),
         "irregularity_max": highest(irregularity),
         "irregular_pct": percent(irregularity > IRREGULAR),
-        "unreached": math.nan if np.isnan(frontage).any() else int((~p.reached[chosen]).sum()),
         "frontage_mean_m": mean(frontage),
         "frontage_min_m": lowest(frontage),
+        **(_on_streets(p, chosen) if fabric.parcels.frontage_known else {}),
         **_proportions(p, chosen),
         "thinness_mean": mean(thinness),
         "thinness_min": lowest(thinness),
@@ -59,8 +59,6 @@ def parcel_values(
         "undesirable": int(p.undesirable[chosen].sum()),
         "neighbours_mean": mean(fabric.parcels.neighbours[chosen]),
         "undesirable_pct": percent(p.undesirable[chosen]),
-        "through_lots": int(p.through[chosen].sum()),
-        "through_lots_pct": percent(p.through[chosen]),
         "area_mean_m2": mean_area,
         "area_cv": float(area.std() / mean_area) if n else math.nan,
         "area_min_over_mean": lowest(area) / mean_area,
@@ -68,6 +66,15 @@ def parcel_values(
         **_above(counted, smallest),
         "net_area_mean_m2": mean(net),
         "net_area_min_m2": lowest(net),
+    }
+
+
+def _on_streets(p: ParcelMeasures, chosen: BoolArray) -> dict[str, float]:
+    """What frontage says of the parcels, where it is known."""
+    return {
+        "unreached": int((~p.reached[chosen]).sum()),
+        "through_lots": int(p.through[chosen].sum()),
+        "through_lots_pct": percent(p.through[chosen]),
     }
 
 

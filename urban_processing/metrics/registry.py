@@ -10,7 +10,7 @@ INTERIOR = "_interior"
 
 
 class Better(enum.StrEnum):
-    """Which values of a metric are better, where everybody would say the same."""
+    """Which values of a metric are better by what is commonly wanted of a plan."""
 
     LOW = "low"
     HIGH = "high"

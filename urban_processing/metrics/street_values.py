@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import shapely
 
 from urban_processing.fabric.model import Fabric
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.metrics.averages import highest, in_part, mean
+from urban_processing.metrics.land_values import land_area
 from urban_processing.metrics.registry import INTERIOR
 from urban_processing.metrics.segments import Segments
 from urban_processing.streets.classes import NodeKind
@@ -25,11 +25,10 @@ GRID_ENTROPY = math.log(4.0)
 
 def street_values(fabric: Fabric, segments: Segments, part: int | None) -> dict[str, float]:
     """Metrics of the streets without the rim, of the whole or of one part."""
-    land = float(shapely.area(fabric.land[in_part(fabric.land_part, part)]).sum())
     return {
         **_chen(fabric, part),
         **_shares(fabric, part),
-        **_shape(segments, part, land),
+        **_shape(segments, part, land_area(fabric, part)),
     }
 
 
@@ -74,7 +73,8 @@ def _shares(fabric: Fabric, part: int | None) -> dict[str, float]:
         side = math.sqrt(mean(parcels.rings.area[inside]))
         n_parcels = int(inside.sum())
         values["parcels_per_street"] = n_parcels / n_streets if n_streets else math.nan
-        values["street_length_relative"] = length / n_parcels / side
+        if parcels.frontage_known:
+            values["street_length_relative"] = length / n_parcels / side
     if fabric.inner_edges is not None:
         chosen = slice(None) if part is None else part
         inner = float(fabric.inner_edges.length[chosen].sum())

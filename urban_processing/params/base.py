@@ -111,6 +111,14 @@ class Params:
         return cls(**values)
 
     @classmethod
+    def usable(cls, values: Mapping[str, Any]) -> Self | None:
+        """Create an instance that layers are read with; None where a value is wrong.
+
+        What is wrong is told by `from_values`, together with what is wrong with the layers.
+        """
+        return None if cls.problems_with(values) else cls(**values)
+
+    @classmethod
     def problems_with(
         cls,
         values: Mapping[str, Any],

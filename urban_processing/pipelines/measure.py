@@ -9,6 +9,7 @@ from hashlib import sha256
 
 from urban_processing.errors import ParameterError
 from urban_processing.fabric.model import ComparedFabrics, Fabric
+from urban_processing.metrics.common_land import shared_land
 from urban_processing.metrics.comparison import Comparison, Side, compare, unique_names
 from urban_processing.metrics.measures import FabricMeasures
 from urban_processing.metrics.samples import samples
@@ -50,11 +51,8 @@ def measure(fabric: Fabric, params: MeasureParams, progress: Progress = SILENT) 
         input_sha256=fabric.input_sha256,
         seconds=time.perf_counter() - started,
     )
-    measured = FabricMeasures(replace(fabric, history=(*earlier, step)))
-    # what is worked out needs not be worked out again
-    measured.__dict__.update({k: v for k, v in known.__dict__.items() if k != "fabric"})
     progress.update(1.0, "Measured")
-    return measured
+    return known.with_history((*earlier, step))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +107,7 @@ def compare_fabrics(
         seed=params.seed,
         resamples=params.resamples,
         confidence=params.confidence,
+        shared_land=[shared_land(f, fabrics[names.index(reference)]) for f in fabrics],
     )
     progress.update(1.0, "Compared")
     digest = sha256("".join(known.fabric.input_sha256 for known in measured).encode())

@@ -172,8 +172,6 @@ def _pair_arms(
     """All pairs of arms at junctions, and which of them continue as one street.
 
     Arm ``k`` is the start of network edge ``k``, arm ``K + k`` its end.
-    arm_points
-        Ends of the chords.
     """
     arms = np.flatnonzero(node_kind[arm_node] >= NodeKind.JUNCTION)
     arms = arms[np.lexsort((arms % max(len(first), 1), arm_node[arms]))]

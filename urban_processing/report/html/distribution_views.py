@@ -10,7 +10,6 @@ from urban_processing.report.html.charts import Chart, chart
 from urban_processing.report.html.digits import decimals_for, number
 from urban_processing.report.html.model import Report
 from urban_processing.report.html.sentences import (
-    mean,
     of_distance,
     of_distribution,
     quantile,
@@ -92,7 +91,7 @@ def _side_lines(
 ) -> tuple[SideLine, ...]:
     """Figures of all sides with the same decimals; those of directions have no order."""
     figures = [
-        () if spec.circular else (mean(s), *(quantile(s, q) for q in QUANTILES)) for s in samples
+        () if spec.circular else (s.mean, *(quantile(s, q) for q in QUANTILES)) for s in samples
     ]
     decimals = decimals_for([value for each in figures for value in each])
     return tuple(

@@ -55,7 +55,7 @@ _LABELS = {
     "through_lots_pct": "Share of through lots",
     "undesirable": "Undesirable parcels",
     "undesirable_pct": "Share of undesirable parcels",
-    "unreached": "Parcels without a street",
+    "unreached": "Parcels with too little frontage for access",
     "width_depth_median": "Median width over depth",
     "width_depth_p10": "Width over depth, lowest tenth below",
     "width_depth_p90": "Width over depth, highest tenth above",

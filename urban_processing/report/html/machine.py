@@ -12,13 +12,14 @@ import numpy as np
 
 from urban_processing.metrics.certificate import Certificate
 from urban_processing.metrics.comparison import DistributionDistance, MetricRow, unique_names
+from urban_processing.metrics.comparison_notes import notes
 from urban_processing.metrics.distributions import Sample
 from urban_processing.metrics.histograms import Histogram
 from urban_processing.provenance import Step
 from urban_processing.report.html.labels import group, label
 from urban_processing.report.html.metric_rows import metric_rows
 from urban_processing.report.html.model import Report, ReportSide
-from urban_processing.report.html.sentences import mean, quantile
+from urban_processing.report.html.sentences import quantile
 from urban_processing.report.html.text import clean
 from urban_processing.tables import Table
 from urban_processing.version import __version__
@@ -64,6 +65,8 @@ def report_json(report: Report) -> dict[str, Any]:
         ``distances``
             For each distribution and each side but the reference what `DistributionDistance`
             has, with the name of the distribution.
+        ``notes``
+            What is to be known first: ``about`` (``lands`` or ``density``) and ``message``.
     """
     names = report.names
     return {
@@ -78,6 +81,9 @@ def report_json(report: Report) -> dict[str, Any]:
         "distances": []
         if report.comparison is None
         else [_distance(d) for d in report.comparison.distances],
+        "notes": []
+        if report.comparison is None
+        else [{"about": a, "message": clean(text)} for a, text in notes(report.comparison)],
     }
 
 
@@ -114,8 +120,9 @@ def report_csv(report: Report) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text that no program takes for a formula."""
-    return f"'{text}" if text[:1] in _FORMULAS and text else text
+    """Text that no program takes for a formula, or its carriage returns for the end of a row."""
+    safe = f"'{text}" if text[:1] in _FORMULAS and text else text
+    return safe.replace("\r\n", "\n").replace("\r", "\n")  # these csv puts into quotes
 
 
 def _side(name: str, side: ReportSide) -> dict[str, Any]:
@@ -203,7 +210,7 @@ def _distribution(h: Histogram, report: Report) -> dict[str, Any]:
 def _figures(sample: Sample, *, circular: bool) -> dict[str, Any]:
     """What there is to say of values; directions have neither mean nor order."""
     figures = {
-        "mean": mean(sample),
+        "mean": sample.mean,
         "median": quantile(sample, 0.5),
         "p10": quantile(sample, 0.1),
         "p90": quantile(sample, 0.9),

@@ -75,6 +75,8 @@ def _context(report: Report) -> dict[str, Any]:
     others = [name for k, name in enumerate(names) if k != report.reference]
     # what all sides have comes first
     known = sorted(FIGURES, key=lambda f: sum(f.about not in each for each in figures))
+    rows = [(f.about, [each.get(f.about, "") for each in figures]) for f in known]
+    alike = [about for about, texts in rows if n > 1 and len(set(texts)) == 1 and texts[0]]
     return {
         "style": _file(STYLE),
         "title": isolate(report.heading),
@@ -83,11 +85,8 @@ def _context(report: Report) -> dict[str, Any]:
         "others": others,
         "listed": listed(others),
         "lines": [line_of(k, n) for k in range(n)],
-        "figures": [
-            (f.about, [each.get(f.about, "") for each in figures])
-            for f in known
-            if any(f.about in each for each in figures)
-        ],
+        "figures": [(about, texts) for about, texts in rows if any(texts) and about not in alike],
+        "alike": listed([about.lower() for about in alike]) if alike else "",
         "verdict": () if comparison is None else verdict(comparison, names),
         "confidence": None if comparison is None else comparison.resampling.confidence,
         "sheet": map_sheet(report),

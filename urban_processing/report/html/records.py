@@ -8,11 +8,20 @@ from typing import Any
 
 from urban_processing.metrics.certificate import Certificate, Check
 from urban_processing.provenance import Step
-from urban_processing.report.html.digits import number
+from urban_processing.report.html.digits import counted, number
 from urban_processing.report.html.sentences import PROMISES
+from urban_processing.report.html.text import listed
 from urban_processing.tables import Table
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+FROM_READING = frozenset(
+    {
+        *("osm_source", "osm_left_out", "osm_cleaned", "osm_streets", "ends_joined"),
+        *("crossings_noded", "crs_changed", "layer_reprojected", "land_assumed"),
+    }
+)
+"""Issues that tell how something was read, of which nothing is wrong."""
 
 MOST = 50
 """Rows and numbers of parcels that are shown; of the others the page says how many there are."""
@@ -33,10 +42,16 @@ class CheckLine:
 
 @dataclass(frozen=True)
 class IssueList:
-    """The issues of one side: how many of each kind, and the first of them."""
+    """The issues of one side: how many of each kind, and the first of them.
+
+    `counts` is their number in words, where notes from reading are told apart; `wrong` of them are
+    none.
+    """
 
     side: str
     total: int
+    counts: str
+    wrong: int
     kinds: tuple[tuple[str, int], ...]
     rows: tuple[tuple[str, str, str, str, str, str], ...]
     more: int
@@ -88,7 +103,7 @@ def _exact(value: float) -> str:
 def issue_list(side: str, issues: Table | None) -> IssueList:
     """Return the issues of one side, in the order in which they are listed."""
     if issues is None:
-        return IssueList(side, 0, (), (), 0)
+        return IssueList(side, 0, "", 0, (), (), 0)
     codes = Counter(map(str, issues["code"].tolist()))
     columns = [
         [_known(value) for value in issues[name][:MOST].tolist()]
@@ -97,7 +112,11 @@ def issue_list(side: str, issues: Table | None) -> IssueList:
     rows: list[Any] = list(zip(*columns, strict=True))
     total = len(issues)
     kinds = tuple(sorted(codes.items(), key=lambda kind: (-kind[1], kind[0])))
-    return IssueList(side, total, kinds, tuple(rows), max(total - MOST, 0))
+    read = sum(n for code, n in codes.items() if code in FROM_READING)
+    wrong = total - read
+    counts = [counted(wrong, "issue")] if wrong else []
+    counts += [counted(read, "note from reading", "notes from reading")] if read else []
+    return IssueList(side, total, listed(counts), wrong, kinds, tuple(rows), max(total - MOST, 0))
 
 
 def _known(value: Any) -> str:

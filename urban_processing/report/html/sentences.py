@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urban_processing.metrics.comparison import DistributionDistance
+from urban_processing.metrics.comparison_words import told_by
 from urban_processing.metrics.distributions import Sample
 from urban_processing.metrics.histograms import Histogram
 from urban_processing.metrics.registry import Better
@@ -44,11 +45,20 @@ USES = ("parcels", "streets", "parks", "other")
 
 @dataclass(frozen=True)
 class Figure:
-    """One of the figures that a planner reads first: what it is about, and a sentence."""
+    """One of the figures that a planner reads first: what it is about, and a sentence.
+
+    It is said where the metric `needs` is known, and `some`, if given, is above 0.
+    """
 
     about: str
     needs: str
     say: Callable[[Values], str]
+    some: str = ""
+
+    def known(self, values: Values) -> bool:
+        """Whether there is something to say."""
+        there = not self.some or values.get(self.some, math.nan) > 0.0
+        return there and math.isfinite(values.get(self.needs, math.nan))
 
 
 def _area(v: Values) -> str:
@@ -60,7 +70,12 @@ def _area(v: Values) -> str:
 
 def _unreached(v: Values) -> str:
     n = int(v["unreached"])
-    return "a street reaches every parcel" if n == 0 else f"{n:,} without a street"
+    if n == 0:
+        return "a street reaches every parcel"
+    return (
+        f"{counted(n, 'parcel')} with too little frontage for access (under 3 m, or a quarter of "
+        "√area where that is less) or none"
+    )
 
 
 def _uses(v: Values) -> str:
@@ -143,8 +158,9 @@ FIGURES: tuple[Figure, ...] = (
         "network_detour",
         lambda v: (
             f"along streets {_of(v, 'network_detour', '', 2)} times as far as the straight line "
-            "from intersection to intersection"
+            "between intersections and ends of streets"
         ),
+        some="intersections",
     ),
 )
 """The ten figures that a planner reads first."""
@@ -152,12 +168,7 @@ FIGURES: tuple[Figure, ...] = (
 
 def first_figures(values: Values) -> list[tuple[str, str]]:
     """Return the figures that are known: what they are about, and a sentence on each."""
-    return [(f.about, f.say(values)) for f in FIGURES if math.isfinite(values.get(f.needs, np.nan))]
-
-
-def mean(sample: Sample) -> float:
-    """Return the mean, weighted where there are weights; NaN of nothing."""
-    return float(np.average(sample.values, weights=sample.weights)) if len(sample) else math.nan
+    return [(f.about, f.say(values)) for f in FIGURES if f.known(values)]
 
 
 def quantile(sample: Sample, part: float) -> float:
@@ -206,10 +217,12 @@ def of_distance(
     """
     spec = d.distribution
     first, second = names
+    by = told_by(d)
     chance = "by more than chance" if d.more_than_noise else "no more than by chance"
+    chance += f" ({by})" if by else ""
     if spec.circular:
         return f"Directions of {first} and {second} differ {chance}."
-    ends = mean(side), mean(reference)
+    ends = side.mean, reference.mean
     decimals = decimals_for(ends)
     change = round(ends[0] - ends[1], decimals)
     if change == 0.0:

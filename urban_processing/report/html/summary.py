@@ -5,10 +5,20 @@ from __future__ import annotations
 import math
 
 from urban_processing.metrics.comparison import Comparison, DistributionDistance
-from urban_processing.metrics.comparison_words import judged_rows, largest_distances
+from urban_processing.metrics.comparison_notes import DENSITY, LANDS, notes
+from urban_processing.metrics.comparison_words import (
+    WANTED,
+    judged_rows,
+    largest_distances,
+    middles,
+    told_by,
+)
 from urban_processing.report.html.digits import decimals_for, number, with_unit
 from urban_processing.report.html.labels import label
 from urban_processing.report.html.text import listed
+
+ABOUT = {LANDS: "Not the same land", DENSITY: "Another density"}
+"""Headings of notes."""
 
 MOST_NAMED = 6
 """Metrics that are named of a side; of the others it is said how many there are."""
@@ -17,9 +27,14 @@ MOST_NAMED = 6
 def verdict(comparison: Comparison, names: tuple[str, ...]) -> list[tuple[str, str]]:
     """Return what each sentence is about, and the sentence; `names` as they are to be shown.
 
-    First who is better and in what, then which distributions differ, and how far.
+    First what is to be known of lands and density, then what differs most, and how far, last who is
+    better and in what.
     """
-    return [*_better(comparison, names), *_distributions(comparison, names)]
+    return [
+        *((ABOUT[about], text) for about, text in notes(comparison, names)),
+        *_distributions(comparison, names),
+        *_better(comparison, names),
+    ]
 
 
 def _better(comparison: Comparison, names: tuple[str, ...]) -> list[tuple[str, str]]:
@@ -33,8 +48,8 @@ def _better(comparison: Comparison, names: tuple[str, ...]) -> list[tuple[str, s
     lines = [
         (
             "Better",
-            f"{counts} of the {len(judged)} metrics that tell better from worse and that "
-            f"{'both' if len(names) == 2 else 'two or more'} sides have a value of"
+            f"{counts} of the {len(judged)} metrics that "
+            f"{'both' if len(names) == 2 else 'two or more'} sides have a value of, {WANTED}"
             f"{f'; {alike} alike' if alike else ''}.",
         )
     ]
@@ -51,24 +66,29 @@ def _distributions(comparison: Comparison, names: tuple[str, ...]) -> list[tuple
     if not known:
         return [("Distributions", "Two sides have no values in common that could be compared.")]
     real = sum(d.more_than_noise for d in known)
-    much = "; those that differ most:" if real else "."
-    text = f"{real} of {len(known)} differ by more than chance{much}"
+    most = largest_distances(comparison)
+    # several sides may differ in the same
+    labels = list(dict.fromkeys(d.distribution.label for d in most))
+    lead = f"{listed([labels[0], *map(str.lower, labels[1:])])}. " if labels else ""
+    text = f"{lead}{real} of {len(known)} distributions differ by more than chance."
     shown = dict(zip(comparison.names, names, strict=True))
     return [
-        ("Distributions", text),
-        *((d.distribution.label, _apart(d, shown)) for d in largest_distances(comparison)),
+        ("Differs most" if labels else "Distributions", text),
+        *((d.distribution.label, _apart(comparison, d, shown)) for d in most),
     ]
 
 
-def _apart(d: DistributionDistance, shown: dict[str, str]) -> str:
+def _apart(comparison: Comparison, d: DistributionDistance, shown: dict[str, str]) -> str:
     unit, side, reference = d.distribution.unit, shown[d.side], shown[d.reference]
     distance = f"distance {interval(d.wasserstein, d.wasserstein_low, d.wasserstein_high, unit)}"
-    medians = (d.median_side, d.median_reference)
-    if math.isnan(sum(medians)):
+    by = told_by(d)
+    distance += f"; more than chance {by}" if by else ""
+    middle, *values = middles(comparison, d)
+    if math.isnan(sum(values)):
         return f"{side} and {reference}: {distance}."
-    decimals = decimals_for(medians)
-    first, second = (with_unit(value, unit, decimals) for value in medians)
-    return f"median {first} in {side}, {second} in {reference}; {distance}."
+    decimals = decimals_for(values)
+    first, second = (with_unit(value, unit, decimals) for value in values)
+    return f"{middle} {first} in {side}, {second} in {reference}; {distance}."
 
 
 def interval(value: float, low: float, high: float, unit: str) -> str:

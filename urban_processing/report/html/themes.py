@@ -46,6 +46,9 @@ MOST_EDGES = 6
 WIDE = 5.0
 """Areas that are so many times larger than others are classed by factors."""
 
+NARROW = 1e-3
+"""Areas that differ by less, in proportion, are of one class: labels could not tell more."""
+
 CLASSES = 6
 """Classes of frontage, besides none."""
 
@@ -179,8 +182,8 @@ def _frontage(parcels: Sequence[Table]) -> Theme | None:
         frontage = np.asarray(table["frontage_m"], dtype=np.float64)
         none = int((np.round(frontage, 3) <= 0.0).sum())
         median = with_unit(float(np.median(frontage)), "m", 1)
-        who = f"{_of(none, table)} have no" if none else f"All {len(table):,} parcels have"
-        return f"{who} frontage; the median is {median}."
+        who = f"{_of(none, table)} have no" if none else f"All {len(table):,} parcels have some"
+        return f"{who} frontage{' at all' if none else ''}; the median is {median}."
 
     return Theme(
         "frontage",
@@ -333,7 +336,7 @@ def round_edges(low: float, high: float) -> list[float]:
     >>> round_edges(900.0, 60000.0), round_edges(410.0, 690.0), round_edges(5.0, 5.0)
     ([1000.0, 2000.0, 5000.0, 10000.0, 20000.0, 50000.0], [450.0, 500.0, 550.0, 600.0, 650.0], [])
     """
-    if not 0.0 < low < high * (1 - 1e-6):
+    if not 0.0 < low < high * (1 - NARROW):
         return []
     if high < WIDE * low:
         step = round_up((high - low) / MOST_EDGES)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from urban_processing.errors import OutputError
 from urban_processing.layout_file.writing import replacing
-from urban_processing.paths import file_problems
+from urban_processing.paths import file_problems, replaced_problems
 from urban_processing.report.html.machine import report_csv, report_json
 from urban_processing.report.html.model import Report
 from urban_processing.report.html.page import report_html
@@ -39,12 +39,7 @@ def report_problems(
     problems = file_problems(target)
     if target.suffix.lower() not in endings:
         problems.append(f"The {_KINDS[endings]} {target} must end in {' or '.join(endings)}.")
-    if target.is_file() and not overwrite:
-        problems.append(
-            f"The output {target} exists already: choose another name, or allow overwriting "
-            "(--overwrite)."
-        )
-    return problems
+    return [*problems, *replaced_problems(target, overwrite=overwrite)]
 
 
 def write(report: Report, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
