@@ -17,7 +17,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 FROM_READING = frozenset(
     {
-        *("osm_source", "osm_left_out", "osm_cleaned", "osm_streets", "ends_joined"),
+        *("osm_source", "osm_left_out", "osm_cleaned", "osm_smaller", "osm_streets", "ends_joined"),
         *("crossings_noded", "crs_changed", "layer_reprojected", "land_assumed"),
     }
 )
