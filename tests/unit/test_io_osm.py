@@ -662,7 +662,7 @@ towns = st.lists(st.lists(places, min_size=2, max_size=5, unique=True), min_size
 
 
 @settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(ways=towns, seed=st.integers(0, 9))
 def test_any_network_is_cut_noded_and_in_one_order(
@@ -706,3 +706,22 @@ def test_real_streets_are_sound_and_fewer_when_cleaned() -> None:
     assert 0.8 * len(mapped.streets) < len(cleaned.streets) < len(mapped.streets)
     names = [set(o.streets["name"]) for o in (mapped, cleaned)]
     assert len(names[0] & names[1]) > 0.9 * len(names[0])
+
+
+def test_a_network_that_would_grow_by_cleaning_stays_as_mapped(tmp_path: Path) -> None:
+    """Two streets that part at a sharp angle: neatnet fills the wedge with hundreds of edges."""
+    ways = [
+        [(300.0, 300.0), (0.0, 0.0)],
+        [(300.0, 0.0), (200.0, 225.0)],
+        [(150.0, 0.0), (300.0, 0.0), (200.0, 175.0), (0.0, 0.0), (0.0, 25.0)],
+        [(0.0, 0.0), (275.0, 0.0)],
+        [(0.0, 75.0), (0.0, 0.0), (0.0, 150.0), (100.0, 50.0)],
+        [(125.0, 125.0), (0.0, 225.0), (300.0, 275.0), (50.0, 25.0), (150.0, 175.0)],
+    ]
+    town = Town([(way, {"highway": "residential"}) for way in ways])
+    site, path = land(-10, -10, 310, 310), town.write(tmp_path / "a.osm")
+    cleaned = read_osm_streets(site, osm_file=path)
+    mapped = read_osm_streets(site, osm_file=path, clean=False)
+    assert cleaned.streets.length.sum() <= 1.01 * mapped.streets.length.sum()
+    assert len(cleaned.streets) <= len(mapped.streets)
+    assert set(cleaned.streets.highway) == {"residential"}

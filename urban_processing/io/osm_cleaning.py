@@ -44,6 +44,9 @@ CONSOLIDATED = 2.1
 REACH = 30.0
 """Metres within which the end of a motorway's slip road follows a street that was moved."""
 
+MOST_GROWN = 0.01
+"""Share of its length by which a network may grow by cleaning."""
+
 AT_VERTEX = 0.5
 """Metres to a vertex within which no other is made."""
 
@@ -103,9 +106,9 @@ def cleaned(streets: Lines, motorways: Lines, crs: pyproj.CRS) -> CleanedNetwork
     2026): faces of the network that are no blocks (`osm_faces.are_blocks`) are replaced by the
     line in their middle, in a way that streets go on as before. Where streets are lost for
     all that (`LONGEST_LOST`, `MOST_LOST`), the faces beside them stay as they are mapped, and the
-    whole network if that does not help. neatnet knows nothing of levels and
-    would draw a street into the motorway above it: motorways stay as they are mapped, and their
-    slip roads end where the street is that they led to.
+    whole network if that does not help, or if it would grow (`MOST_GROWN`). neatnet knows nothing
+    of levels and would draw a street into the motorway above it: motorways stay as they are
+    mapped, and their slip roads end where the street is that they led to.
 
     Parameters
     ----------
@@ -138,6 +141,10 @@ def cleaned(streets: Lines, motorways: Lines, crs: pyproj.CRS) -> CleanedNetwork
         lost = lost_streets(streets, np.concatenate([lines, rings]))
         if _share(lost, streets) > MOST_LOST:
             failure = f"{shapely.length(lost).sum() / 1e3:.1f} km of streets would be lost"
+    # middle lines are shorter than what they stand for: more street is street made up
+    grown = float(shapely.length(lines).sum() - shapely.length(streets).sum())
+    if grown > MOST_GROWN * float(shapely.length(streets).sum()):
+        failure = failure or f"{grown / 1e3:.1f} km of street would be made up"
     if failure:
         return CleanedNetwork(mapped, failure=failure)
     ground, slip_roads = _met(network_edges(lines), motorways, streets)

@@ -152,6 +152,12 @@ def tags_along(edges: Lines, lines: Lines, tags: Tags) -> dict[str, npt.NDArray[
         else:
             values = np.where(distance <= ON, values, "")
             out[name] = _longest(edge, values, weight, (values != "").astype(int), len(edges))
+    alone = np.flatnonzero(~np.isin(np.arange(len(edges)), edge))
+    if len(alone) and len(lines):  # none runs alongside: what is nearest
+        middle = shapely.line_interpolate_point(edges[alone], 0.5, normalized=True)
+        nearest = shapely.STRtree(lines).nearest(middle)
+        for name in (HIGHWAY, NAME):
+            out[name][alone] = tags[name][nearest].astype(str)
     return out
 
 
