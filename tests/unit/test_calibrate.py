@@ -26,7 +26,7 @@ from urban_processing.params.subdivide import per_block_parameters
 
 CRS = "EPSG:32632"
 X, Y = 500_000.0, 5_200_000.0
-REAL = Path("/work/shared/data/test_only/parcels")
+REAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "test_only" / "parcels"
 
 
 def box(*bounds: float) -> shapely.Polygon:
