@@ -104,18 +104,6 @@ _PRODUCTS: Mapping[OutputKind, Callable[[Any], Product]] = {
 }
 
 
-def write_report(kind: OutputKind, report: Any, path: Path) -> None:
-    """Write a report, or its figures."""
-    from urban_processing.report import html
-
-    write = {
-        OutputKind.REPORT: html.write_report,
-        OutputKind.JSON: html.write_json,
-        OutputKind.CSV: html.write_csv,
-    }
-    write[kind](report, path, overwrite=True)
-
-
 def _sentences(history: Sequence[Step]) -> list[str]:
     return [
         f"{step.algorithm} {step.version}, seed {step.seed}, input {step.input_sha256}, "

@@ -11,7 +11,7 @@ from qgis_plugin.crs import crs_of
 from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
-from qgis_plugin.products import product, write_report
+from qgis_plugin.products import product
 from qgis_plugin.results import write_sink
 from qgis_plugin.sources import Sources
 from qgis_plugin.styling import ResultGroup
@@ -68,7 +68,9 @@ def run(
             whole = products[of]
             (whole.write if output.kind.is_geopackage else whole.plot)(path)
         else:
-            write_report(output.kind, made[of], path)
+            from urban_processing.report.html import write as write_report
+
+            write_report(made[of], path, overwrite=True)  # in the format of its ending
         results[name] = str(path)
     groups = {
         name: ResultGroup(_title(sources.name, spec, params), whole.history)

@@ -92,8 +92,7 @@ def _read_layout(
     from urban_processing.io.layouts import read_layers
 
     parcels, streets = (
-        next(given[i.name] for i in spec.inputs if i.kind is kind)
-        for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER)
+        _given_of(spec, given, kind) for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER)
     )
     return read_layers(parcels, streets, snap=snap or 0.0)
 
@@ -144,7 +143,7 @@ def _read_centrelines(
         return None
     from urban_processing.io.blocks import read_streets
 
-    land = next((given[i.name] for i in spec.inputs if i.kind is InputKind.LAND), None)
+    land = _given_of(spec, given, InputKind.LAND)
     return read_streets(
         given[item.name],
         land=land,
@@ -164,7 +163,7 @@ def _read_blocks(
         return None
     from urban_processing.io.blocks import read_blocks
 
-    streets = next((given[i.name] for i in spec.inputs if i.kind is InputKind.BLOCK_STREETS), None)
+    streets = _given_of(spec, given, InputKind.BLOCK_STREETS)
     return read_blocks(
         given[item.name],
         streets=streets,
@@ -185,7 +184,7 @@ def _read_observed(
         return None
     from urban_processing.io.observed import read_observed
 
-    blocks = next((given[i.name] for i in spec.inputs if i.kind is InputKind.OBSERVED_BLOCKS), None)
+    blocks = _given_of(spec, given, InputKind.OBSERVED_BLOCKS)
     return read_observed(
         given[item.name],
         blocks,
@@ -267,7 +266,12 @@ def _read_fabrics(
 def _layers_of(spec: AlgorithmSpec, given: Mapping[str, Any]) -> list[Any]:
     """Parcels, streets and land that were given as layers."""
     kinds = (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER, InputKind.LAND)
-    return [next((given[i.name] for i in spec.inputs if i.kind is kind), None) for kind in kinds]
+    return [_given_of(spec, given, kind) for kind in kinds]
+
+
+def _given_of(spec: AlgorithmSpec, given: Mapping[str, Any], kind: InputKind) -> Any:
+    """What was given for the input of a kind; None where nothing was, or there is no such input."""
+    return next((given[i.name] for i in spec.inputs if i.kind is kind), None)
 
 
 def named_file(text: str) -> tuple[str, str]:

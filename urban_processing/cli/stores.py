@@ -22,10 +22,10 @@ def problems(output: Output, whole: Output, given: Mapping[str, Any]) -> list[st
 
         return check_output(path, overwrite=overwrite)
     if output.kind.endings:
-        from urban_processing.paths import ending_problems
+        from urban_processing.paths import ending_problems, replaced_problems
 
         wrong = ending_problems(path, output.kind.value, output.kind.endings)
-        return [*wrong, *_in_the_way(path, overwrite)]
+        return [*wrong, *replaced_problems(path, overwrite=overwrite)]
     from urban_processing.io.exports import check_export
 
     kind = _kind(output, given)
@@ -51,7 +51,9 @@ def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
         _plot(made, path)
         return path
     if output.kind in (OutputKind.REPORT, OutputKind.JSON, OutputKind.CSV):
-        return _write_report(output, made, path, overwrite=overwrite)
+        from urban_processing.report.html import write as write_report
+
+        return write_report(made, path, overwrite=overwrite)  # in the format of its ending
     from urban_processing.io.exports import export_layers, export_layout
     from urban_processing.tables import LayerSet
 
@@ -59,17 +61,6 @@ def write(output: Output, made: Any, given: Mapping[str, Any]) -> Path:
     if isinstance(made, LayerSet):
         return export_layers(made.layers(), path, crs=made.frame.crs, **how)
     return export_layout(made, path, **how)
-
-
-def _write_report(output: Output, made: Any, path: Path, *, overwrite: bool) -> Path:
-    from urban_processing.report.html import write_csv, write_json, write_report
-
-    writers = {
-        OutputKind.REPORT: write_report,
-        OutputKind.JSON: write_json,
-        OutputKind.CSV: write_csv,
-    }
-    return writers[output.kind](made, path, overwrite=overwrite)
 
 
 def _plot(made: Any, path: Path) -> None:
@@ -89,11 +80,3 @@ def _kind(output: Output, given: Mapping[str, Any]) -> str:
     """Format of plain files: of a view an option of its own, else a parameter."""
     name = f"{output.name}_format" if output.of else "format"
     return str(given[name] or ExportParams.format)
-
-
-def _in_the_way(path: Path, overwrite: bool) -> list[str]:
-    if path.is_file() and not overwrite:
-        return [
-            f"The {path} exists already: choose another name, or allow overwriting (--overwrite)."
-        ]
-    return []
