@@ -38,6 +38,10 @@ class InfeasibleError(UrbanError):
     """What was asked for cannot be reached on this land."""
 
 
+class EditError(UrbanError):
+    """An edit cannot be done, or would break the design requirements; nothing has changed."""
+
+
 class TopologyError(UrbanError):
     """An invariant of the planar mesh does not hold."""
 

@@ -36,6 +36,27 @@ class EdgeKind(enum.IntEnum):
     """On the rim of an obstacle that the user gave, also where it touches the outer rim."""
 
 
+class Stage(enum.IntEnum):
+    """Whether co-generation goes on with a parcel."""
+
+    DONE = 0
+    """It is not cut any more, unless somebody cuts it."""
+    OPEN = 1
+    """The next level cuts it, if it is large enough."""
+    AHEAD = 2
+    """It has its cut of the next level already; the level after that goes on with it."""
+
+
+class Steering(enum.IntFlag):
+    """What a planner decided of a mesh edge."""
+
+    NONE = 0
+    NO_STREET = 1
+    """No street is laid here, unless a parcel cannot be reached otherwise."""
+    KEPT = 2
+    """A boundary that was chosen or drawn: the parcels beside it are not joined across it."""
+
+
 ON_OBSTACLE = 1e-5
 """An edge of the rim within this many metres of an obstacle is on it: vertices are rounded."""
 
@@ -83,6 +104,8 @@ class Layout:
     edge_fixed
         (E,) entry of `fixed_streets` that an edge is on; -1 for all other edges. Such edges
         stay streets, and stay where they are.
+    edge_steering
+        (E,) `Steering` of an edge.
     face_part
         (F,) part of the land that a face belongs to.
     face_level
@@ -94,6 +117,10 @@ class Layout:
         (F,) faces that are not to be cut.
     face_use
         (F,) entry of `land_uses`.
+    face_stage
+        (F,) `Stage` of a face.
+    face_quota
+        (F,) number of parcels that a face is still to become; 0 where no number was given.
     min_area
         The smallest parcel allowed, m².
     street_rules
@@ -122,11 +149,14 @@ class Layout:
     edge_kind: npt.NDArray[np.int8]
     edge_level: npt.NDArray[np.int16]
     edge_fixed: IntArray
+    edge_steering: npt.NDArray[np.uint8]
     face_part: IntArray
     face_level: IntArray
     face_lineage: npt.NDArray[np.uint64]
     face_locked: BoolArray
     face_use: IntArray
+    face_stage: npt.NDArray[np.int8]
+    face_quota: IntArray
     min_area: float
     street_rules: StreetRules = field(default_factory=StreetRules)
     corners_given: bool = False
@@ -161,11 +191,16 @@ class Layout:
             edge_kind=np.where(new_edge, EdgeKind.INTERIOR, self.edge_kind[remap.edge]),
             edge_level=np.where(new_edge, -1, self.edge_level[remap.edge]).astype(np.int16),
             edge_fixed=np.where(new_edge, NOT_FIXED, self.edge_fixed[remap.edge]),
+            edge_steering=np.where(new_edge, Steering.NONE, self.edge_steering[remap.edge]).astype(
+                np.uint8
+            ),
             face_part=self.face_part[remap.face],
             face_level=self.face_level[remap.face] + face_split,
             face_lineage=np.where(face_split, _child_lineage(lineage, remap.face), lineage),
             face_locked=self.face_locked[remap.face],
             face_use=self.face_use[remap.face],
+            face_stage=self.face_stage[remap.face],
+            face_quota=self.face_quota[remap.face],
         )
 
     @cached_property
@@ -177,8 +212,13 @@ class Layout:
     def _graph_nodes(self) -> BoolArray:
         nodes = self.vertex_corner | self.vertex_entry
         nodes |= _changes(self.mesh, self.edge_street)
-        # the chains of the graph are of one kind, and fixed as a whole or not at all
-        for some in (self.edge_kind == EdgeKind.OBSTACLE, self.edge_fixed != NOT_FIXED):
+        # the chains of the graph are of one kind, and fixed or steered as a whole or not at all
+        for some in (
+            self.edge_kind == EdgeKind.OBSTACLE,
+            self.edge_fixed != NOT_FIXED,
+            self.steered(Steering.NO_STREET),
+            self.steered(Steering.KEPT),
+        ):
             if some.any():
                 nodes |= _changes(self.mesh, some)
         return nodes
@@ -197,6 +237,10 @@ class Layout:
     def chain_fixed(self) -> BoolArray:
         """(M,) whether a chain of the corner graph is a street that the user gave."""
         return np.asarray(self.edge_fixed[self.corner_graph.first_edge()] != NOT_FIXED)
+
+    def steered(self, what: Steering) -> BoolArray:
+        """(E,) whether a planner decided this of an edge."""
+        return np.asarray((self.edge_steering & what) != 0)
 
     @cached_property
     def frontage(self) -> FloatArray:
@@ -262,12 +306,15 @@ def layout_from_mesh(
         edge_kind=kind,
         edge_level=np.where(street, 0, -1).astype(np.int16),
         edge_fixed=np.full(mesh.n_edges, NOT_FIXED),
+        edge_steering=np.full(mesh.n_edges, Steering.NONE, dtype=np.uint8),
         face_part=np.asarray(face_part, dtype=np.int64),
         face_level=np.zeros(n_faces, dtype=np.int64),
         # far from the ranks that children are told apart by
         face_lineage=splitmix64(np.arange(n_faces).astype(np.uint64) + np.uint64(2**32)),
         face_locked=np.zeros(n_faces, dtype=bool),
         face_use=np.zeros(n_faces, dtype=np.int64),
+        face_stage=np.full(n_faces, Stage.DONE, dtype=np.int8),
+        face_quota=np.zeros(n_faces, dtype=np.int64),
         min_area=min_area,
         obstacles=tuple(obstacles),
     )

@@ -9,7 +9,14 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import TopologyError
-from urban_processing.layout import NOT_FIXED, PARCEL_USE, GivenStreet, Layout, edge_kinds
+from urban_processing.layout import (
+    NOT_FIXED,
+    PARCEL_USE,
+    GivenStreet,
+    Layout,
+    Steering,
+    edge_kinds,
+)
 from urban_processing.mesh.build import canonical_rings, mesh_from_polygons
 from urban_processing.mesh.places import edges_at, vertices_at
 from urban_processing.mesh.planar import BoolArray, FloatArray, IntArray
@@ -40,6 +47,12 @@ class LayoutParts:
         (N, 2) places where the network meets the outside.
     face_use
         (F,) entry of `land_uses`.
+    face_stage, face_quota
+        (F,) as in `Layout`.
+    steered
+        (T, 2, 2) ends of the mesh edges that a planner decided something of.
+    steering
+        (T,) what that is, as in `Layout`.
     obstacles, fixed_streets, land_uses
         As in `Layout`.
     """
@@ -55,6 +68,10 @@ class LayoutParts:
     corners: FloatArray
     entries: FloatArray
     face_use: IntArray
+    face_stage: npt.NDArray[np.int8]
+    face_quota: IntArray
+    steered: FloatArray
+    steering: npt.NDArray[np.uint8]
     obstacles: tuple[shapely.Polygon, ...] = ()
     fixed_streets: tuple[GivenStreet, ...] = ()
     land_uses: tuple[str, ...] = (PARCEL_USE,)
@@ -68,6 +85,7 @@ def canonical(layout: Layout) -> Layout:
     """
     mesh = layout.mesh
     street = np.flatnonzero(layout.edge_street)
+    steered = np.flatnonzero(layout.edge_steering)
     parts = LayoutParts(
         polygons=mesh.face_polygons(),
         face_part=layout.face_part,
@@ -80,6 +98,10 @@ def canonical(layout: Layout) -> Layout:
         corners=mesh.xy[layout.vertex_corner],
         entries=mesh.xy[layout.vertex_entry],
         face_use=layout.face_use,
+        face_stage=layout.face_stage,
+        face_quota=layout.face_quota,
+        steered=mesh.xy[mesh.origin.reshape(-1, 2)[steered]],
+        steering=layout.edge_steering[steered],
         obstacles=layout.obstacles,
         fixed_streets=layout.fixed_streets,
         land_uses=layout.land_uses,
@@ -102,7 +124,7 @@ def _same_numbering(a: Layout, b: Layout) -> bool:
         for name in ("xy", "origin", "next", "face")
     ) and all(
         np.array_equal(getattr(a, name), getattr(b, name))
-        for name in ("vertex_corner", "edge_street", "edge_kind", "edge_level")
+        for name in ("vertex_corner", "edge_street", "edge_kind", "edge_level", "edge_steering")
     )
 
 
@@ -114,7 +136,7 @@ def rebuild_layout(
     Raises
     ------
     TopologyError
-        If parcels overlap, or a street segment is no edge of a parcel.
+        If parcels overlap, or a street segment or steered edge is no edge of a parcel.
     """
     mesh = mesh_from_polygons(list(canonical_rings(parts.polygons)))
     edge = edges_at(mesh, parts.segments)
@@ -126,6 +148,13 @@ def rebuild_layout(
     level[edge] = parts.segment_level
     fixed = np.full(mesh.n_edges, NOT_FIXED)
     fixed[edge] = parts.segment_fixed
+    steered = edges_at(mesh, parts.steered)
+    if (steered < 0).any():
+        raise TopologyError(
+            f"{int((steered < 0).sum())} pieces of boundary that were decided of are none any more."
+        )
+    steering = np.full(mesh.n_edges, Steering.NONE, dtype=np.uint8)
+    steering[steered] = parts.steering
     return Layout(
         mesh=mesh,
         frame=frame,
@@ -135,11 +164,14 @@ def rebuild_layout(
         edge_kind=edge_kinds(mesh, parts.obstacles),
         edge_level=level,
         edge_fixed=fixed,
+        edge_steering=steering,
         face_part=np.asarray(parts.face_part, dtype=np.int64),
         face_level=np.asarray(parts.face_level, dtype=np.int64),
         face_lineage=np.asarray(parts.face_lineage, dtype=np.uint64),
         face_locked=np.asarray(parts.face_locked, dtype=bool),
         face_use=np.asarray(parts.face_use, dtype=np.int64),
+        face_stage=np.asarray(parts.face_stage, dtype=np.int8),
+        face_quota=np.asarray(parts.face_quota, dtype=np.int64),
         min_area=min_area,
         issues=issues,
         obstacles=parts.obstacles,

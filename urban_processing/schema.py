@@ -197,6 +197,18 @@ PARCELS = Layer(
             "Area of the smallest rotated rectangle around the parcel over its own (Yang 2013).",
         ),
         _text("lineage", "Lineage", "Path in the tree of cuts, hashed to 16 hexadecimal digits."),
+        _text(
+            "stage",
+            "Stage",
+            "Whether co-generation goes on with the parcel: done; open, to be cut at the next "
+            "level if it is large enough; ahead, if it has its cut of that level already.",
+        ),
+        _integer(
+            "quota",
+            "Quota",
+            "Number of parcels that it is still to become; empty where no number was given.",
+            nullable=True,
+        ),
     ),
     "Parcels",
     shown=True,

@@ -16,7 +16,7 @@ import shapely
 
 from urban_processing.assembly import assemble_layout
 from urban_processing.errors import BoundaryError, TopologyError, UrbanError
-from urban_processing.layout import NOT_FIXED, GivenStreet, Layout
+from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Stage
 from urban_processing.layout_file.geopackage import (
     LAYERS_STATE,
     LAYOUT_STATE,
@@ -42,8 +42,9 @@ from urban_processing.site import FloatArray, Frame, Issue
 from urban_processing.street_rules import StreetRules
 from urban_processing.tables import Table
 
-FILE_FORMAT = 1
-"""Number of the way in which layout files keep what the schema does not say."""
+FILE_FORMAT = 2
+"""Number of the way in which layout files keep what the schema does not say. Files of format 1
+know no stages of parcels: they were all finished."""
 
 
 def write_layout(
@@ -259,8 +260,17 @@ def _state(layout: Layout) -> str:
                 for s in layout.fixed_streets
             ],
             "land_uses": list(layout.land_uses),
+            "steered_edges": _steered_edges(layout),
         }
     )
+
+
+def _steered_edges(layout: Layout) -> list[list[float]]:
+    """Ends of the edges that a planner decided something of, and what."""
+    mesh, steered = layout.mesh, np.flatnonzero(layout.edge_steering)
+    ends = mesh.xy[mesh.origin.reshape(-1, 2)[steered]].reshape(-1, 4)
+    rows: list[list[float]] = np.column_stack([ends, layout.edge_steering[steered]]).tolist()
+    return rows
 
 
 def _read_state(path: Path) -> dict[str, Any]:
@@ -281,7 +291,9 @@ def _read_state(path: Path) -> dict[str, Any]:
 
 
 def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
-    columns = "parcel_id", "part", "level", "lineage", "locked", "land_use"
+    columns = ["parcel_id", "part", "level", "lineage", "locked", "land_use"]
+    if state["format"] > 1:
+        columns += ["stage", "quota"]
     polygons, parcel = file.layer(PARCELS.name, *columns)
     order = np.argsort(parcel["parcel_id"], kind="stable")
     lines, street = file.layer(STREETS.name, "level", "fixed_id")
@@ -290,6 +302,8 @@ def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
     uses = list(state["land_uses"])
     uses += sorted(set(parcel["land_use"].tolist()) - set(uses))
     use = [uses.index(name) for name in parcel["land_use"].tolist()]
+    stage, quota = _stages(parcel, len(polygons))
+    steered = np.asarray(state.get("steered_edges", []), dtype=np.float64).reshape(-1, 5)
     return LayoutParts(
         polygons=polygons[order],
         face_part=parcel["part"][order],
@@ -302,10 +316,25 @@ def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
         corners=_places(state["corners"]),
         entries=_places(state["entries"]),
         face_use=np.array(use, dtype=np.int64)[order],
+        face_stage=stage[order],
+        face_quota=quota[order],
+        steered=steered[:, :4].reshape(-1, 2, 2),
+        steering=steered[:, 4].astype(np.uint8),
         obstacles=_read_polygons(file, OBSTACLES.name),
         fixed_streets=_given_streets(state),
         land_uses=tuple(uses),
     )
+
+
+def _stages(
+    parcel: Mapping[str, npt.NDArray[Any]], n_parcels: int
+) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.int64]]:
+    """Stage and quota of each parcel; done and none where the file does not know them."""
+    if "stage" not in parcel:
+        return np.full(n_parcels, Stage.DONE, dtype=np.int8), np.zeros(n_parcels, dtype=np.int64)
+    stage = [Stage[name.upper()] for name in parcel["stage"].tolist()]
+    quota = np.nan_to_num(np.asarray(parcel["quota"], dtype=np.float64))
+    return np.array(stage, dtype=np.int8), quota.astype(np.int64)
 
 
 def _places(xy: Any) -> FloatArray:

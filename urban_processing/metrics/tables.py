@@ -9,7 +9,7 @@ import numpy.typing as npt
 import shapely
 
 from urban_processing.fabric.of_layout import land_of_layout
-from urban_processing.layout import ON_OBSTACLE, EdgeKind, Layout
+from urban_processing.layout import ON_OBSTACLE, EdgeKind, Layout, Stage
 from urban_processing.metrics.measures import LayoutMeasures, Metric, measure
 from urban_processing.metrics.parcels import ParcelMeasures
 from urban_processing.rights_of_way import RightsOfWay
@@ -85,6 +85,8 @@ def parcel_table(layout: Layout, *, measures: LayoutMeasures | None = None) -> T
             "land_use": [layout.land_uses[i] for i in layout.face_use.tolist()],
             "locked": layout.face_locked,
             "lineage": [f"{v:016x}" for v in layout.face_lineage.tolist()],
+            "stage": [Stage(v).name.lower() for v in layout.face_stage.tolist()],
+            "quota": np.where(layout.face_quota > 0, layout.face_quota, np.nan),
         },
         layout.mesh.face_polygons(layout.frame.origin),
     )

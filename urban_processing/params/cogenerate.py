@@ -49,6 +49,18 @@ _SIZE, _SHAPE, _STREETS, _DIMENSIONS = "Size", "Parcel shape", "Streets", "Dimen
 _WIDTHS = "Rights-of-way"
 
 
+StopAtLevel = Annotated[
+    int | None,
+    Param(
+        label="Stop at level",
+        help="Stop after so many levels of cuts, for the layout to be looked at and edited; "
+        "resume goes on with it.",
+        minimum=0,
+        advanced=True,
+    ),
+]
+"""The parameter of algorithms that go through the levels."""
+
 LEAST_WIDTH = 1.0
 """Smallest width in metres of a street inside the land."""
 
@@ -199,6 +211,7 @@ class CogenerateParams(Params):
             "regular in the end.",
         ),
     ] = True
+    stop_at_level: StopAtLevel = None
     rim: Annotated[
         RimStreet | None,
         Param(

@@ -8,11 +8,12 @@ import numpy as np
 import shapely
 
 from urban_processing.blocks.model import UNKNOWN_STREET, BlockRings
-from urban_processing.layout import Layout, layout_from_mesh
+from urban_processing.layout import Layout, Steering, layout_from_mesh
 from urban_processing.mesh.build import canonical_rings, mesh_from_polygons
+from urban_processing.mesh.components import components
 from urban_processing.mesh.coverage import fit_together
 from urban_processing.mesh.places import segments_on, vertices_at
-from urban_processing.mesh.planar import IntArray, PlanarMesh
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, IntArray, PlanarMesh
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.parcelling.divide import divide
 from urban_processing.parcelling.ground import Ground, Pieces
@@ -27,7 +28,8 @@ def divide_street_blocks(layout: Layout, params: SubdivideParams) -> Layout:
     """Divide every block of the street network into parcels, whatever it consisted of.
 
     A block into which streets lead that end there is divided parcel by parcel, so that these
-    streets stay. Locked parcels stay as they are. Pieces under the layout's smallest area are
+    streets stay. So is each side of a boundary that a planner wants by itself. Locked parcels
+    stay as they are. Pieces under the layout's smallest area are
     joined to a neighbour.
 
     Parameters
@@ -56,7 +58,7 @@ class _Outline:
 def _outlines(layout: Layout) -> list[_Outline]:
     """Blocks as a whole where they are plain polygons, else their parcels one by one."""
     free = np.flatnonzero(~layout.face_locked)
-    block = layout.face_block[free]
+    block = _pieces_of_blocks(layout)[free]
     order = np.argsort(block, kind="stable")
     groups = np.split(free[order], np.flatnonzero(np.diff(block[order])) + 1)
     found = []
@@ -67,6 +69,13 @@ def _outlines(layout: Layout) -> list[_Outline]:
         )
         found += [outline for outline in single if outline is not None]
     return found
+
+
+def _pieces_of_blocks(layout: Layout) -> IntArray:
+    """(F,) blocks, cut along the boundaries that a planner wants."""
+    sides = layout.mesh.face.reshape(-1, 2)
+    joined = ~layout.edge_street & ~layout.steered(Steering.KEPT) & (sides != OUTSIDE).all(axis=1)
+    return components(layout.mesh.n_faces, sides[joined])
 
 
 def _outline(layout: Layout, faces: IntArray) -> _Outline | None:
@@ -142,14 +151,18 @@ def _rebuilt(layout: Layout, outlines: list[_Outline], pieces: Pieces, whole: Wh
         rim_is_street=False,
         obstacles=layout.obstacles,
     )
-    edge, street = _streets_on(after, layout)
+    edge, street = _edges_on(after, layout, layout.edge_street)
     edge_level, edge_fixed = rebuilt.edge_level.copy(), rebuilt.edge_fixed.copy()
     edge_level[edge], edge_fixed[edge] = layout.edge_level[street], layout.edge_fixed[street]
+    edge_steering = rebuilt.edge_steering.copy()
+    edge, steered = _edges_on(after, layout, layout.edge_steering != Steering.NONE)
+    edge_steering[edge] = layout.edge_steering[steered]
     return rebuilt.replace(
         vertex_entry=vertices_at(after.xy, mesh.xy[layout.vertex_entry]),
         edge_street=edge_level >= 0,
         edge_level=edge_level,
         edge_fixed=edge_fixed,
+        edge_steering=edge_steering,
         face_level=levels[coverage.source],
         face_lineage=lineage[coverage.source],
         face_locked=layout.face_locked[source],
@@ -164,11 +177,11 @@ def _rebuilt(layout: Layout, outlines: list[_Outline], pieces: Pieces, whole: Wh
     )
 
 
-def _streets_on(mesh: PlanarMesh, before: Layout) -> tuple[IntArray, IntArray]:
-    """Edges of the mesh that lie on streets of the layout before, and on which edge of it."""
+def _edges_on(mesh: PlanarMesh, before: Layout, chosen: BoolArray) -> tuple[IntArray, IntArray]:
+    """Edges of the mesh that lie on chosen ones of the layout before, and on which of them."""
     old = before.mesh
-    streets = np.flatnonzero(before.edge_street)
-    lines = shapely.linestrings(old.xy[old.origin.reshape(-1, 2)[streets]])
+    some = np.flatnonzero(chosen)
+    lines = shapely.linestrings(old.xy[old.origin.reshape(-1, 2)[some]])
     edges = mesh.xy[mesh.origin.reshape(-1, 2)]
-    street, edge = segments_on(edges, lines, 2 * TOGETHER)
-    return edge, streets[street]
+    on, edge = segments_on(edges, lines, 2 * TOGETHER)
+    return edge, some[on]

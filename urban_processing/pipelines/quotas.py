@@ -24,11 +24,11 @@ def shared_out(area: FloatArray, total: int) -> IntArray:
 
 
 def divided(quota: IntArray, parent: IntArray, area: FloatArray) -> IntArray:
-    """Divide the quotas of cut faces over their pieces in proportion to the area."""
+    """Divide the quotas of cut faces over their pieces in proportion to the area; 0 stays 0."""
     order = np.argsort(parent, kind="stable")
     start = np.flatnonzero(np.diff(parent[order], prepend=-1))
     out = quota[parent]
     for pieces in np.split(order, start[1:]):
-        if len(pieces) > 1:
+        if len(pieces) > 1 and quota[parent[pieces[0]]] > 0:
             out[pieces] = shared_out(area[pieces], int(quota[parent[pieces[0]]]))
     return out

@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from urban_processing.access_rule import required_frontage
-from urban_processing.layout import EdgeKind, Layout
+from urban_processing.layout import EdgeKind, Layout, Steering
 from urban_processing.mesh.corner_graph import CornerGraph
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
 from urban_processing.params import CogenerateParams
@@ -53,7 +53,8 @@ class StreetState:
         self.unclosed_cost = UNCLOSED_COST * max(1.0, self.turn_cost)
         self.side = math.sqrt(float(mesh.face_area.mean()))
         interior = layout.chain_kind == EdgeKind.INTERIOR
-        usable = interior | layout.chain_street
+        barred = layout.steered(Steering.NO_STREET)[graph.first_edge()]
+        usable = (interior & ~barred) | layout.chain_street
         # streets that the user gave stay
         self.removable: list[bool] = (interior & ~layout.chain_fixed).tolist()
         self.fixed: list[bool] = layout.chain_fixed.tolist()

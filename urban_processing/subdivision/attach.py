@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urban_processing.layout import EdgeKind, Layout
+from urban_processing.layout import EdgeKind, Layout, Steering
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import BoolArray, IntArray
 
@@ -19,7 +19,8 @@ BARE = -1
 
 def usable_edges(layout: Layout) -> BoolArray:
     """(E,) edges that are street or may become street."""
-    return np.asarray((layout.edge_kind == EdgeKind.INTERIOR) | layout.edge_street)
+    free = (layout.edge_kind == EdgeKind.INTERIOR) & ~layout.steered(Steering.NO_STREET)
+    return np.asarray(free | layout.edge_street)
 
 
 def edge_networks(layout: Layout) -> IntArray:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from urban_processing.access_rule import is_reached
-from urban_processing.layout import Layout
+from urban_processing.layout import Layout, Steering
 from urban_processing.mesh.corners import polygon_irregularity, reported_corners
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray
@@ -86,12 +86,14 @@ def _costs(layout: Layout, params: CogenerateParams) -> FloatArray:
 def joinable_pairs(layout: Layout) -> list[Pair]:
     """Neighbours that can become one parcel, those with the longest common side first.
 
-    They are not locked, no street lies between them, and they have one side in common.
+    They are not locked, no street and no boundary that a planner wants lies between them, and
+    they have one side in common.
     """
     graph = layout.corner_graph
     left, right = graph.face[0::2], graph.face[1::2]
     inner = (left != OUTSIDE) & (right != OUTSIDE) & (left != right)
     inner &= ~layout.chain_street[0::2]
+    inner &= ~layout.steered(Steering.KEPT)[graph.first_edge()[0::2]]
     barred = layout.face_locked | (layout.mesh.face_n_loops > 1)
     inner[inner] &= ~(barred[left[inner]] | barred[right[inner]])
     usable = np.flatnonzero(inner & _only_contact(left, right))
@@ -205,7 +207,10 @@ def join_pairs(layout: Layout, pairs: list[Pair]) -> tuple[Layout, npt.NDArray[n
             given = layout.vertex_corner[vertex] or layout.vertex_entry[vertex]
             if editor.valence[vertex] == 2 and not given:
                 a, b = (editor.edge_parent[h >> 1] for h in editor.outgoing(vertex))
-                edge_tables = layout.edge_street, layout.edge_fixed, layout.edge_kind
+                edge_tables = (
+                    *(layout.edge_street, layout.edge_fixed, layout.edge_kind),
+                    layout.edge_steering,
+                )
                 if all(values[a] == values[b] for values in edge_tables):
                     _straighten(editor, vertex)
     mesh, remap = editor.commit()

@@ -1,0 +1,1 @@
+"""Steering a layout level by level: candidates, choices, edits, undo (Chen 2024, section 6)."""

@@ -1,0 +1,103 @@
+"""A state of a session with the numbers of its parcels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from urban_processing.errors import EditError
+from urban_processing.hashing import child
+from urban_processing.mesh.planar import FloatArray
+from urban_processing.pipelines.levels import State
+
+PARTS_OF_CUT = (0, 1)
+"""Ranks of the halves of a cut parcel among its parts, as `hashing.child` counts them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A state, and the number of every parcel there is or was on the way to it.
+
+    A parcel keeps its number as long as it is neither cut nor merged; one that comes back when
+    its cut is undone has the number that it had.
+
+    Parameters
+    ----------
+    state
+        Layout and level.
+    known
+        Number, counted from 1, of each lineage (see `Layout.face_lineage`).
+    """
+
+    state: State
+    known: Mapping[int, int]
+
+    @cached_property
+    def parcels(self) -> tuple[int, ...]:
+        """(F,) number of each face."""
+        known = self.known
+        return tuple(known[lineage] for lineage in self.state.layout.face_lineage.tolist())
+
+    @cached_property
+    def _face_of(self) -> dict[int, int]:
+        return {number: face for face, number in enumerate(self.parcels)}
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        return shapely.STRtree(self.state.layout.mesh.face_polygons())
+
+    def number(self, face: int) -> int:
+        """Number of a face's parcel."""
+        return self.parcels[face]
+
+    def face(self, parcel: int) -> int:
+        """Face of a parcel; `EditError` where there is no such parcel any more, or never was."""
+        face = self._face_of.get(parcel)
+        if face is None:
+            raise EditError(self._unknown(parcel))
+        return face
+
+    def face_at(self, place: FloatArray) -> int | None:
+        """Face at a place (x, y) in local coordinates; None where there is no parcel."""
+        found = self._tree.query(shapely.Point(place), predicate="intersects")
+        return int(found.min()) if len(found) else None
+
+    def _unknown(self, parcel: int) -> str:
+        lineage = next((key for key, number in self.known.items() if number == parcel), None)
+        if lineage is None:
+            return f"There is no parcel {parcel}."
+        halves = [self.known.get(child(lineage, rank)) for rank in PARTS_OF_CUT]
+        if None in halves:
+            return f"Parcel {parcel} is no more: it was merged with others, or divided anew."
+        return f"Parcel {parcel} is no more: it was cut into {halves[0]} and {halves[1]}."
+
+
+def first_moment(state: State) -> Moment:
+    """The moment that a session begins with."""
+    return next_moment(Moment(state, {}), state)
+
+
+def next_moment(before: Moment, state: State) -> Moment:
+    """The moment after an edit: new parcels get the next numbers, in the order of their faces."""
+    known = dict(before.known)
+    following = max(known.values(), default=0) + 1
+    for lineage in state.layout.face_lineage.tolist():
+        if lineage not in known:
+            known[lineage] = following
+            following += 1
+    return Moment(state, known)
+
+
+def as_place(xy: object) -> FloatArray:
+    """(2,) coordinates of a place; `EditError` where they are none."""
+    try:
+        place = np.asarray(xy, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        place = np.empty(0)
+    if len(place) != 2 or not np.isfinite(place).all():
+        raise EditError(f"A place must be two coordinates, x and y; {xy!r} is none.")
+    return place
