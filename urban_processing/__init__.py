@@ -23,12 +23,14 @@ if TYPE_CHECKING:
         find_blocks,
         measure,
         optimize,
+        steer,
         subdivide,
         transfer,
     )
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.io.measured import GeoComparison, GeoFabric
+    from urban_processing.io.sessions import GeoSession
     from urban_processing.params.blocks import BlocksParams
     from urban_processing.params.calibrate import CalibrateParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
@@ -48,6 +50,7 @@ _HOME = {
     "GeoFabric": "urban_processing.io.measured",
     "GeoLayers": "urban_processing.io.frames",
     "GeoLayout": "urban_processing.io.frames",
+    "GeoSession": "urban_processing.io.sessions",
     "MeasureParams": "urban_processing.params.measure",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
@@ -62,6 +65,7 @@ _HOME = {
     "measure": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
+    "steer": "urban_processing.api",
     "subdivide": "urban_processing.api",
     "transfer": "urban_processing.api",
 }
@@ -75,6 +79,7 @@ __all__ = [
     "GeoFabric",
     "GeoLayers",
     "GeoLayout",
+    "GeoSession",
     "MeasureParams",
     "OptimizeParams",
     "Preset",
@@ -91,6 +96,7 @@ __all__ = [
     "measure",
     "optimize",
     "read_layout",
+    "steer",
     "subdivide",
     "transfer",
 ]

@@ -3,6 +3,7 @@
 from urban_processing.api.blocks import calibrate, find_blocks, subdivide, transfer
 from urban_processing.api.layouts import cogenerate, optimize
 from urban_processing.api.measuring import compare, measure
+from urban_processing.api.steering import steer
 
 __all__ = [
     "calibrate",
@@ -11,6 +12,7 @@ __all__ = [
     "find_blocks",
     "measure",
     "optimize",
+    "steer",
     "subdivide",
     "transfer",
 ]

@@ -8,19 +8,16 @@ from typing import Any
 
 import numpy.typing as npt
 
-from urban_processing.api.gathering import gathered
+from urban_processing.api.land import land_and_params
 from urban_processing.errors import BoundaryError
-from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.layouts import read_layers
 from urban_processing.layout import Layout
-from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
-from urban_processing.pipelines.ground import given_layers
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
 
@@ -77,19 +74,18 @@ def cogenerate(
     >>> bool(layout.parcels.area_m2.min() >= 1500)
     True
     """
-    layers = {
-        "streets": streets,
-        "obstacles": obstacles,
-        "locked": locked,
-        "rim_lines": rim_lines,
-        "entries": entries,
-    }
-    given = [name for name, value in layers.items() if value is not None]
-    if isinstance(boundary, Site):
-        given += given_layers(boundary)
-    params, site = gathered(
-        lambda: CogenerateParams.from_values(parameters, given),
-        lambda: _site(boundary, crs=crs, layer=layer, where=where, corners=corners, **layers),
+    site, params = land_and_params(
+        boundary,
+        parameters,
+        crs=crs,
+        layer=layer,
+        where=where,
+        corners=corners,
+        streets=streets,
+        obstacles=obstacles,
+        locked=locked,
+        rim_lines=rim_lines,
+        entries=entries,
     )
     expected = pipeline.estimate(site, params)
     if expected.parcels > MANY_PARCELS and progress is SILENT:
@@ -177,12 +173,3 @@ def _layout(
             f"{type(layout).__name__} is no layout: give what cogenerate made, or its file."
         )
     return read_layout(layout, snap=params.snap).layout
-
-
-def _site(boundary: Source | Site, **options: Any) -> Site:
-    if not isinstance(boundary, Site):
-        return read_boundary(boundary, **options)
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise BoundaryError(f"A Site is ready as it is: leave out {', '.join(given)}.")
-    return boundary
