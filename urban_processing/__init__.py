@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         find_blocks,
         measure,
         optimize,
+        resume,
         steer,
         subdivide,
         transfer,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from urban_processing.params.compare import CompareParams
     from urban_processing.params.measure import MeasureParams
     from urban_processing.params.optimize import OptimizeParams
+    from urban_processing.params.resume import ResumeParams
     from urban_processing.params.rules import Preset
     from urban_processing.params.subdivide import Strategy, SubdivideParams
     from urban_processing.params.transfer import TransferParams
@@ -54,6 +56,7 @@ _HOME = {
     "MeasureParams": "urban_processing.params.measure",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
+    "ResumeParams": "urban_processing.params.resume",
     "Strategy": "urban_processing.params.subdivide",
     "StreetPattern": "urban_processing.params.cogenerate",
     "SubdivideParams": "urban_processing.params.subdivide",
@@ -65,6 +68,7 @@ _HOME = {
     "measure": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
+    "resume": "urban_processing.api",
     "steer": "urban_processing.api",
     "subdivide": "urban_processing.api",
     "transfer": "urban_processing.api",
@@ -83,6 +87,7 @@ __all__ = [
     "MeasureParams",
     "OptimizeParams",
     "Preset",
+    "ResumeParams",
     "Strategy",
     "StreetPattern",
     "SubdivideParams",
@@ -96,6 +101,7 @@ __all__ = [
     "measure",
     "optimize",
     "read_layout",
+    "resume",
     "steer",
     "subdivide",
     "transfer",
