@@ -65,7 +65,6 @@ class Session:
     def __init__(self, state: State, start: files.Start) -> None:
         self._start = start
         self._timeline = Timeline.beginning(first_moment(state), start.sentence)
-        self._candidates: tuple[Moment, dict[int, tuple[Candidate, ...]]] | None = None
 
     @classmethod
     def begin(cls, site: Site, params: CogenerateParams) -> Self:
@@ -179,13 +178,7 @@ class Session:
         neighbour's cut of the same level ends.
         """
         moment = self._moment
-        if self._candidates is None or self._candidates[0] is not moment:
-            self._candidates = moment, {}
-        known = self._candidates[1]
-        face = face_of(moment, read_parcel(parcel))
-        if face not in known:
-            known[face] = cuts_of(moment, face)
-        return known[face]
+        return cuts_of(moment, face_of(moment, read_parcel(parcel)))
 
     # edits
 
@@ -301,6 +294,7 @@ class Session:
         before = self._moment
         after, sentence = _applied(before, edit, progress)
         self._timeline.add(edit, after, sentence)
+        before.cuts.clear()  # they take memory, and are found again if somebody comes back
         return _change(before, after, sentence)
 
     @staticmethod
