@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -14,9 +14,19 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.assembly import assemble_layout
+from urban_processing.assembly import EDITED, Kept, assemble_layout
 from urban_processing.errors import BoundaryError, TopologyError, UrbanError
-from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Stage
+from urban_processing.layer_rows import (
+    PARCEL_COLUMNS,
+    QUOTA,
+    STAGE,
+    STREET_COLUMNS,
+    ParcelRows,
+    parcel_rows,
+    street_rows,
+    values_of_faces,
+)
+from urban_processing.layout import GivenStreet, Layout, Stage
 from urban_processing.layout_file.geopackage import (
     LAYERS_STATE,
     LAYOUT_STATE,
@@ -25,7 +35,7 @@ from urban_processing.layout_file.geopackage import (
     write_geopackage,
 )
 from urban_processing.layout_file.writing import replacing, writable
-from urban_processing.mesh.places import line_segments, vertices_at
+from urban_processing.mesh.places import line_segments
 from urban_processing.metrics.tables import layout_tables
 from urban_processing.provenance import Step, timeless
 from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
@@ -43,8 +53,10 @@ from urban_processing.street_rules import StreetRules
 from urban_processing.tables import Table
 
 FILE_FORMAT = 2
-"""Number of the way in which layout files keep what the schema does not say. Files of format 1
-know no stages of parcels: they were all finished."""
+"""Number of the way in which layout files keep what the schema does not say."""
+
+STAGES_SINCE = 2
+"""Files of older formats know no stages of parcels: they were all finished."""
 
 
 def write_layout(
@@ -142,8 +154,8 @@ def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
     """Read the layout that was written."""
     source = file.path
     try:
-        parts = _read_parts(file, state)
-        issues = _read_issues(file)
+        parts, split = _read_parts(file, state)
+        issues = (*([_NOTE_OF_EDIT] if split else []), *_read_issues(file))
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
         return layout.replace(
             street_rules=StreetRules.from_dict(state.get("street_rules", {})),
@@ -166,32 +178,62 @@ def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
 def _read_edited(file: _File, state: Mapping[str, Any], snap: float) -> Layout:
     """Read parcels and streets, whatever was done to them, and fit them together."""
     try:
-        parcels, parcel = file.layer(PARCELS.name, "locked")
-        streets, street = file.layer(STREETS.name, "fixed_id")
+        parcels, parcel = file.layer(PARCELS.name, *file.known(PARCELS.name, PARCEL_COLUMNS))
+        streets, street = file.layer(STREETS.name, *file.known(STREETS.name, STREET_COLUMNS))
         polygons, of_parcel = _single(parcels, "Polygon")
         lines, of_street = _single(streets, "LineString")
-        locked = np.array([value is True or value == 1 for value in parcel["locked"].tolist()])
+        kept = _kept(file, state)
+        rows = _parcel_rows(parcel, len(parcels), state)
+        given = street_rows(street, len(streets), n_given=len(kept.fixed_streets))
         layout = assemble_layout(
             polygons,
             lines,
             frame=file.frame,
             snap=snap,
-            min_area=state["min_area"],
-            locked=locked[of_parcel],
-            fixed=_fixed_entries(street["fixed_id"])[of_street],
-            obstacles=_read_polygons(file, OBSTACLES.name),
+            kept=kept,
+            rows=(rows.taken(of_parcel), given.taken(of_street)),
         )
-        note = Issue("layers_edited", "Parcels or streets of the file were edited.")
-        return layout.replace(
-            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
-            issues=(note, *layout.issues),
-            history=_read_history(file),
-            input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
-            fixed_streets=_given_streets(state),
-            vertex_entry=vertices_at(layout.mesh.xy, _places(state["entries"])),
-        )
+        return layout.replace(issues=(_NOTE_OF_EDIT, *layout.issues))
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise BoundaryError(f"{file.path} cannot be read: {error}") from error
+
+
+_NOTE_OF_EDIT = Issue(EDITED, "Parcels or streets of the file were edited.")
+
+
+def _kept(file: _File, state: Mapping[str, Any]) -> Kept:
+    """What the file says of a layout besides its parcels and streets."""
+    steered, steering = _steering(state)
+    return Kept(
+        min_area=state["min_area"],
+        corners=_places(state["corners"]),
+        entries=_places(state["entries"]),
+        steered=steered,
+        steering=steering,
+        corners_given=state["corners_given"],
+        street_rules=StreetRules.from_dict(state.get("street_rules", {})),
+        obstacles=_read_polygons(file, OBSTACLES.name),
+        fixed_streets=_given_streets(state),
+        land_uses=tuple(state["land_uses"]),
+        history=_read_history(file),
+        input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
+        issues=_read_issues(file),
+    )
+
+
+def _parcel_rows(
+    parcel: Mapping[str, npt.NDArray[Any]], n: int, state: Mapping[str, Any]
+) -> ParcelRows:
+    """What the rows of a file say of parcels; all are done where it knows no stages."""
+    if state["format"] < STAGES_SINCE:
+        parcel = {**parcel, STAGE: np.full(n, Stage.DONE.name, dtype=object)}
+    return parcel_rows(parcel, n)
+
+
+def _steering(state: Mapping[str, Any]) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
+    """Ends of the edges that a planner decided something of, and what."""
+    steered = np.asarray(state.get("steered_edges", []), dtype=np.float64).reshape(-1, 5)
+    return steered[:, :4].reshape(-1, 2, 2), steered[:, 4].astype(np.uint8)
 
 
 def _single(
@@ -203,12 +245,6 @@ def _single(
     parts, index = shapely.get_parts(valid, return_index=True)
     chosen = [i for i, p in enumerate(parts) if p.geom_type == kind and not p.is_empty]
     return parts[chosen], rows[index[chosen]]
-
-
-def _fixed_entries(fixed_id: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Entries of given streets from their numbers, which begin with 1; `NOT_FIXED` for none."""
-    known = np.nan_to_num(np.asarray(fixed_id, dtype=np.float64), nan=NOT_FIXED + 1)
-    return known.astype(np.int64) - 1
 
 
 def _given_streets(state: Mapping[str, Any]) -> tuple[GivenStreet, ...]:
@@ -232,6 +268,11 @@ class _File:
         """Geometries in local coordinates and columns, in the order in which they were written."""
         geometry, values = self.library.read_layer(self.path, name, columns)
         return self.local(geometry), values
+
+    def known(self, name: str, columns: Sequence[str]) -> list[str]:
+        """Those of some columns that a layer has."""
+        there = self.library.column_names(self.path, name)
+        return [column for column in columns if column in there]
 
     def local(self, geometry: Any) -> Any:
         return shapely.transform(geometry, lambda xy: xy - np.asarray(self.frame.origin))
@@ -290,51 +331,45 @@ def _read_state(path: Path) -> dict[str, Any]:
     return state
 
 
-def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
-    columns = ["parcel_id", "part", "level", "lineage", "locked", "land_use"]
-    if state["format"] > 1:
-        columns += ["stage", "quota"]
+def _read_parts(file: _File, state: Mapping[str, Any]) -> tuple[LayoutParts, bool]:
+    """What the file holds, and whether parcels of it were split by hand."""
+    columns = ["parcel_id", "part", *PARCEL_COLUMNS]
+    if state["format"] < STAGES_SINCE:
+        columns = [name for name in columns if name not in (STAGE, QUOTA)]
     polygons, parcel = file.layer(PARCELS.name, *columns)
+    rows = _parcel_rows(parcel, len(polygons), state)
+    if not rows.is_whole:
+        raise ValueError("not all parcels have all of the values that they had")
     order = np.argsort(parcel["parcel_id"], kind="stable")
-    lines, street = file.layer(STREETS.name, "level", "fixed_id")
+    polygons = polygons[order]
+    lines, street = file.layer(STREETS.name, *STREET_COLUMNS)
     segments, line = line_segments(lines)
-    lineage = [int(text, 16) for text in parcel["lineage"]]
-    uses = list(state["land_uses"])
-    uses += sorted(set(parcel["land_use"].tolist()) - set(uses))
-    use = [uses.index(name) for name in parcel["land_use"].tolist()]
-    stage, quota = _stages(parcel, len(polygons))
-    steered = np.asarray(state.get("steered_edges", []), dtype=np.float64).reshape(-1, 5)
-    return LayoutParts(
-        polygons=polygons[order],
+    of_streets = street_rows(street, len(lines), n_given=len(state["fixed_streets"]))
+    if (of_streets.level < 0).any():
+        raise ValueError("not all streets have the level that they had")
+    said = values_of_faces(
+        rows.taken(order),
+        polygons,
+        min_area=state["min_area"],
+        origin=file.frame.origin,
+        land_uses=state["land_uses"],
+    )
+    steered, steering = _steering(state)
+    parts = LayoutParts(
+        polygons=polygons,
         face_part=parcel["part"][order],
-        face_level=parcel["level"][order],
-        face_lineage=np.array(lineage, dtype=np.uint64)[order],
-        face_locked=parcel["locked"].astype(bool)[order],
         segments=segments,
-        segment_level=np.asarray(street["level"], dtype=np.int16)[line],
-        segment_fixed=_fixed_entries(street["fixed_id"])[line],
+        segment_level=of_streets.level[line].astype(np.int16),
+        segment_fixed=of_streets.fixed[line],
         corners=_places(state["corners"]),
         entries=_places(state["entries"]),
-        face_use=np.array(use, dtype=np.int64)[order],
-        face_stage=stage[order],
-        face_quota=quota[order],
-        steered=steered[:, :4].reshape(-1, 2, 2),
-        steering=steered[:, 4].astype(np.uint8),
+        steered=steered,
+        steering=steering,
         obstacles=_read_polygons(file, OBSTACLES.name),
         fixed_streets=_given_streets(state),
-        land_uses=tuple(uses),
+        **said.fields(),
     )
-
-
-def _stages(
-    parcel: Mapping[str, npt.NDArray[Any]], n_parcels: int
-) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.int64]]:
-    """Stage and quota of each parcel; done and none where the file does not know them."""
-    if "stage" not in parcel:
-        return np.full(n_parcels, Stage.DONE, dtype=np.int8), np.zeros(n_parcels, dtype=np.int64)
-    stage = [Stage[name.upper()] for name in parcel["stage"].tolist()]
-    quota = np.nan_to_num(np.asarray(parcel["quota"], dtype=np.float64))
-    return np.array(stage, dtype=np.int8), quota.astype(np.int64)
+    return parts, bool(said.in_pieces.any())
 
 
 def _places(xy: Any) -> FloatArray:

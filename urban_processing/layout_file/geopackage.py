@@ -93,6 +93,10 @@ class LayerLibrary(Protocol):
         """Return the names of a file's layers."""
         ...
 
+    def column_names(self, path: Path, layer: str) -> list[str]:
+        """Return the names of a layer's columns."""
+        ...
+
 
 def write_geopackage(
     path: Path,
