@@ -24,12 +24,14 @@ if TYPE_CHECKING:
         measure,
         optimize,
         resume,
+        steer,
         subdivide,
         transfer,
     )
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.io.measured import GeoComparison, GeoFabric
+    from urban_processing.io.sessions import GeoSession
     from urban_processing.params.blocks import BlocksParams
     from urban_processing.params.calibrate import CalibrateParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
@@ -50,6 +52,7 @@ _HOME = {
     "GeoFabric": "urban_processing.io.measured",
     "GeoLayers": "urban_processing.io.frames",
     "GeoLayout": "urban_processing.io.frames",
+    "GeoSession": "urban_processing.io.sessions",
     "MeasureParams": "urban_processing.params.measure",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
@@ -66,6 +69,7 @@ _HOME = {
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
     "resume": "urban_processing.api",
+    "steer": "urban_processing.api",
     "subdivide": "urban_processing.api",
     "transfer": "urban_processing.api",
 }
@@ -79,6 +83,7 @@ __all__ = [
     "GeoFabric",
     "GeoLayers",
     "GeoLayout",
+    "GeoSession",
     "MeasureParams",
     "OptimizeParams",
     "Preset",
@@ -97,6 +102,7 @@ __all__ = [
     "optimize",
     "read_layout",
     "resume",
+    "steer",
     "subdivide",
     "transfer",
 ]

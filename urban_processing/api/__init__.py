@@ -3,6 +3,7 @@
 from urban_processing.api.blocks import calibrate, find_blocks, subdivide, transfer
 from urban_processing.api.layouts import cogenerate, optimize, resume
 from urban_processing.api.measuring import compare, measure
+from urban_processing.api.steering import steer
 
 __all__ = [
     "calibrate",
@@ -12,6 +13,7 @@ __all__ = [
     "measure",
     "optimize",
     "resume",
+    "steer",
     "subdivide",
     "transfer",
 ]

@@ -9,20 +9,18 @@ from typing import Any
 import numpy.typing as npt
 
 from urban_processing.api.gathering import gathered
+from urban_processing.api.land import land_and_params
 from urban_processing.errors import BoundaryError
-from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.layouts import read_layers
 from urban_processing.layout import Layout
-from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
 from urban_processing.params.resume import PARCEL_LAYER, ResumeParams
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
 from urban_processing.pipelines import resume as going_on
-from urban_processing.pipelines.ground import given_layers
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
 
@@ -79,19 +77,18 @@ def cogenerate(
     >>> bool(layout.parcels.area_m2.min() >= 1500)
     True
     """
-    layers = {
-        "streets": streets,
-        "obstacles": obstacles,
-        "locked": locked,
-        "rim_lines": rim_lines,
-        "entries": entries,
-    }
-    given = [name for name, value in layers.items() if value is not None]
-    if isinstance(boundary, Site):
-        given += given_layers(boundary)
-    params, site = gathered(
-        lambda: CogenerateParams.from_values(parameters, given),
-        lambda: _site(boundary, crs=crs, layer=layer, where=where, corners=corners, **layers),
+    site, params = land_and_params(
+        boundary,
+        parameters,
+        crs=crs,
+        layer=layer,
+        where=where,
+        corners=corners,
+        streets=streets,
+        obstacles=obstacles,
+        locked=locked,
+        rim_lines=rim_lines,
+        entries=entries,
     )
     expected = pipeline.estimate(site, params)
     if expected.parcels > MANY_PARCELS and progress is SILENT:
@@ -200,7 +197,7 @@ def resume(
     >>> land = shapely.box(0, 0, 200, 120)
     >>> begun = cogenerate(land, crs="EPSG:32630", min_area=1500, stop_at_level=2)
     >>> len(begun.parcels), len(resume(begun).parcels)
-    (4, 8)
+    (4, 12)
     """
     given_layers = [] if parcels is None else [PARCEL_LAYER]
     params, given = gathered(
@@ -235,12 +232,3 @@ def _layout(
             f"{type(layout).__name__} is no layout: give what cogenerate made, or its file."
         )
     return read_layout(layout, snap=snap).layout
-
-
-def _site(boundary: Source | Site, **options: Any) -> Site:
-    if not isinstance(boundary, Site):
-        return read_boundary(boundary, **options)
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise BoundaryError(f"A Site is ready as it is: leave out {', '.join(given)}.")
-    return boundary
