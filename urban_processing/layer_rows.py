@@ -41,6 +41,7 @@ VALUES_IGNORED = "values_ignored"
 """Code of the issue that says which values of a column mean nothing."""
 
 _LARGEST = 2**31
+_HALVES = 2
 _TRUE, _FALSE = ("true", "t", "yes", "y", "1"), ("false", "f", "no", "n", "0")
 _PLACES = 1000.0
 """Places are told apart to so many parts of a metre, so that rounding decides nothing."""
@@ -266,24 +267,24 @@ def _families(rows: ParcelRows) -> tuple[IntArray, BoolArray]:
 
 
 def _lineages(rows: ParcelRows, family: IntArray, place: IntArray) -> npt.NDArray[np.uint64]:
-    """(F,) lineages, each there once, whatever the order of rows."""
+    """(F,) lineages, each there once, whatever the order of rows.
+
+    Two pieces are the halves of a cut; more have ranks that no half has.
+    """
     out: list[int | None] = list(rows.lineage.values)
-    single = np.bincount(family)[family] == 1
-    taken = {v for v, alone in zip(out, single.tolist(), strict=True) if alone and v is not None}
-    rank: dict[int, int] = {}
+    pieces = np.bincount(family)[family].tolist()
+    taken = {v for v, n in zip(out, pieces, strict=True) if n == 1 and v is not None}
     for face in np.lexsort(place.T[::-1]).tolist():
         parent = rows.lineage.values[face]
-        if parent is not None and single[face]:
+        if parent is not None and pieces[face] == 1:
             continue
         if parent is None:
-            lineage = mix(mix(int(place[face, 0]) % 2**64) ^ int(place[face, 1]) % 2**64)
-            while lineage in taken:
-                lineage = mix(lineage)
+            x, y = (int(v) % 2**64 for v in place[face, :2])
+            parent, rank = mix(x) ^ y, 0
         else:
-            lineage = child(parent, rank.setdefault(parent, 0))
-            while lineage in taken:
-                rank[parent] += 1
-                lineage = child(parent, rank[parent])
+            rank = 0 if pieces[face] == _HALVES else _HALVES
+        while (lineage := child(parent, rank)) in taken:
+            rank += 1
         taken.add(lineage)
         out[face] = lineage
     return np.array(out, dtype=np.uint64)
