@@ -230,7 +230,8 @@ class Sources:
             found.append(features)
         self.name = self.name or found[0].name
         crs = QgisCrs(self.context.transformContext())
-        return build_layout(*found, library=crs, snap=snap or 0.0)
+        min_area = self.params.as_dict().get("min_area")
+        return build_layout(*found, library=crs, snap=snap or 0.0, min_area=min_area)
 
     def _editions(self, item: Input) -> Editions | None:
         """Read two states of a layout."""

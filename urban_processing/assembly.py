@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -138,7 +139,8 @@ def assemble_layout(
     kept
         What the layout has besides; nothing where the layers come from elsewhere.
     min_area
-        The smallest parcel allowed, m², where nothing is kept; by default the smallest there is.
+        The smallest parcel allowed, m²; by default the one that is kept, or else the smallest
+        there is.
     rows
         What (n,) rows say of the parcels and (m,) rows of the streets.
 
@@ -147,7 +149,9 @@ def assemble_layout(
     BoundaryError
         If nothing is left of the parcels.
     """
-    known = Kept(min_area=min_area) if kept is None else kept
+    known = Kept() if kept is None else kept
+    if min_area is not None:
+        known = dataclasses.replace(known, min_area=min_area)
     of_parcels, of_streets = rows or (parcel_rows({}, len(parcels)), street_rows({}, len(streets)))
     ends = [shapely.get_coordinates(line)[[0, -1]] for line in streets]
     places = np.concatenate(ends) if ends else None

@@ -30,6 +30,7 @@ def build_layout(
     *,
     library: CrsLibrary[C],
     snap: float,
+    min_area: float | None = None,
     before: Layout | None = None,
 ) -> Layout:
     """Make a layout from layers of parcels and streets that need not fit exactly.
@@ -49,6 +50,8 @@ def build_layout(
         What knows the CRSs.
     snap
         Metres within which things fit.
+    min_area
+        The smallest parcel allowed, m²; by default the smallest there is.
     before
         The layout that the layers are edited from: they are brought into its CRS, and what they
         do not say is as it was.
@@ -72,6 +75,7 @@ def build_layout(
         frame=frame,
         snap=snap,
         kept=kept,
+        min_area=min_area,
         rows=(said.taken(of_parcel), of_streets.taken(of_street)),
     )
     return layout.replace(issues=(*issues, *layout.issues))

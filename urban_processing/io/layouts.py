@@ -13,7 +13,12 @@ from urban_processing.schema import PARCELS, STREETS
 
 
 def read_layers(
-    parcels: Source, streets: Source, *, snap: float, before: Layout | None = None
+    parcels: Source,
+    streets: Source,
+    *,
+    snap: float,
+    min_area: float | None = None,
+    before: Layout | None = None,
 ) -> Layout:
     """Make a layout from a layer of parcels and one of streets; it promises what it has.
 
@@ -30,6 +35,8 @@ def read_layers(
         Lines, likewise; in another CRS they are reprojected.
     snap
         Metres within which things fit.
+    min_area
+        The smallest parcel allowed, m²; by default the smallest there is.
     before
         The layout that the layers are edited from, whose CRS, parameters and decisions go on.
 
@@ -45,4 +52,6 @@ def read_layers(
     )
     if polygons is None or lines is None:
         raise BoundaryError(problems)
-    return build_layout(polygons, lines, library=PYPROJ, snap=snap, before=before)
+    return build_layout(
+        polygons, lines, library=PYPROJ, snap=snap, min_area=min_area, before=before
+    )

@@ -155,6 +155,8 @@ def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
     source = file.path
     try:
         parts, split = _read_parts(file, state)
+        if not shapely.coverage_is_valid(parts.polygons):
+            raise TopologyError("Parcels overlap, or a corner of one lies on the side of another.")
         issues = (*([_NOTE_OF_EDIT] if split else []), *_read_issues(file))
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
         return layout.replace(
