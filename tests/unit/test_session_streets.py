@@ -204,8 +204,7 @@ def test_small_halves_are_named() -> None:
     )
     small = moment_of(shapely.box(0, 0, 40, 25))
     assert refusal(small, [(0, 12), (40, 12)], snap=0.2) == (
-        "The line would cut parcel 1. It has 1,000 m²; the smallest parcel allowed is 600 m²: "
-        "lead the line along boundaries there."
+        "Parcel 1 (1,000 m²) is too small to be cut in two: the smallest parcel allowed is 600 m²."
     )
 
 

@@ -17,10 +17,10 @@ from urban_processing.session.cutting import (
     check_large_enough,
     joined,
     thinned,
-    with_vertices,
 )
 from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine, as_line, as_points
 from urban_processing.session.moment import Moment
+from urban_processing.session.spots import with_vertices
 from urban_processing.session.street_lines import AT_LAKE, Link, Plan, barred_edges, plan_street
 from urban_processing.session.ways import costs_near, way_along_corners, way_between
 from urban_processing.session.wording import parcels_named
