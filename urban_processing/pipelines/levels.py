@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +23,9 @@ from urban_processing.pipelines.dimensions import check_dimensions, missed_dimen
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.ground import land_area, lay_ground, settle_islands
 from urban_processing.pipelines.last_levels import divide_street_blocks
-from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
+from urban_processing.quotas import divided, shared_out
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas, set_remnants_aside
@@ -51,8 +54,19 @@ RECUT_SHARE, PRUNED_SHARE = 0.6, 0.7
 ALGORITHM = "cogenerate"
 """Name of the algorithm in provenance."""
 
-LEVEL, BLOCKS_DIVIDED = "level", "blocks_divided"
+LEVEL, BLOCKS_DIVIDED, FINISHED = "level", "blocks_divided", "finished"
 """Results in provenance that tell how far the levels have come."""
+
+FOUND_AT_THE_END = frozenset(
+    {
+        *("block_below_min_area", "block_length_missed", "block_too_long", "count_missed"),
+        *("dead_end", "entry_chosen", "fixed_dead_end", "frontage_missed", "no_entry"),
+        *("parcel_cut_off", "parcel_not_cut", "parcel_not_reached", "parcel_swallowed"),
+        *("part_below_min_area", "part_not_reached", "remnant", "street_on_rim"),
+        "width_depth_missed",
+    }
+)
+"""Codes of the issues that `finish` finds; those of an earlier end are found anew."""
 
 STOPPED = "stopped"
 """Code of the issue that says at which level a layout stopped."""
@@ -78,6 +92,8 @@ class State:
         Number of levels so far.
     blocks_divided
         Whether another strategy than streamlines has done its last levels.
+    completed
+        Whether the layout has been through `finish`.
     """
 
     layout: Layout
@@ -85,6 +101,7 @@ class State:
     min_area: float
     level: int = 0
     blocks_divided: bool = False
+    completed: bool = False
 
     @property
     def floor(self) -> float:
@@ -98,7 +115,7 @@ class State:
 
     def to_cut(self) -> IntArray:
         """Parcels that the next level cuts."""
-        return self._large_enough(Stage.OPEN)
+        return self._large_enough(Stage.OPEN, Stage.BEHIND)
 
     def _large_enough(self, *stages: Stage) -> IntArray:
         layout, mesh = self.layout, self.layout.mesh
@@ -110,14 +127,18 @@ class State:
     @property
     def finished(self) -> bool:
         """Whether no level is to come any more."""
-        return not self.divides_blocks and not len(self._large_enough(Stage.OPEN, Stage.AHEAD))
+        return not self.divides_blocks and not len(self._left())
+
+    def _left(self) -> IntArray:
+        """Parcels that this or a later level cuts."""
+        return self._large_enough(Stage.OPEN, Stage.BEHIND, Stage.AHEAD)
 
     @property
     def divides_blocks(self) -> bool:
         """Whether the next level divides the blocks by another strategy than streamlines."""
         if self.blocks_divided or self.params.strategy is Strategy.STREAMLINE:
             return False
-        return not len(self._large_enough(Stage.OPEN, Stage.AHEAD))
+        return not len(self._left())
 
 
 def smallest_area(site: Site, params: CogenerateParams) -> float:
@@ -256,40 +277,82 @@ def pause(state: State) -> tuple[Layout, dict[str, float]]:
     )
     layout = canonical(state.layout)
     issue = Issue(STOPPED, message, value=float(state.level))
-    return layout.replace(issues=(*layout.issues, issue)), _results(state)
+    return layout.replace(issues=(*layout.issues, issue)), progress_of(state)
 
 
-def _results(state: State) -> dict[str, float]:
-    return {LEVEL: float(state.level), BLOCKS_DIVIDED: float(state.blocks_divided)}
+def progress_of(state: State) -> dict[str, float]:
+    """What provenance tells of how far a state has come, for `state_of`."""
+    return {
+        LEVEL: float(state.level),
+        BLOCKS_DIVIDED: float(state.blocks_divided),
+        FINISHED: float(state.completed),
+    }
 
 
-def state_of(layout: Layout) -> State:
-    """The state of a layout that co-generation made, to go on from there.
+def state_of(layout: Layout, *, min_area: float | None = None) -> State:
+    """The state of a layout, to go on from there.
+
+    Parameters
+    ----------
+    layout
+        Made by co-generation; or by anything else, if the smallest area is given.
+    min_area
+        Smallest parcel allowed from now on, m², in place of what the layout was begun with.
 
     Raises
     ------
     BoundaryError
-        If co-generation did not make it.
+        If no smallest area is given, now or before, and co-generation did not make the layout.
     """
-    made = [step for step in layout.history if step.algorithm == ALGORITHM]
-    told = [step.results for step in layout.history if LEVEL in step.results]
-    if not made or not told:
+    begun = _begun_with(layout.history, min_area)
+    if begun is None:
         raise BoundaryError(
             "The layout does not say what it was begun with: it was not made by cogenerate, or by "
-            "an older version of it. Lay out its land again."
+            "an older version of it. Give min_area (--min-area), the smallest parcel allowed in "
+            "m², to go on with it."
         )
-    params = CogenerateParams.from_values({**made[-1].parameters, "stop_at_level": None})
+    params = CogenerateParams.from_values(begun)
     rules = params.street_rules
-    net = rules.net_min_area and not any(issue.code == STOPPED for issue in layout.issues)
+    told = [step.results for step in layout.history if LEVEL in step.results]
+    results = told[-1] if told else {LEVEL: 0.0, BLOCKS_DIVIDED: 0.0}
+    completed = bool(results.get(FINISHED))
+    floor = layout.min_area
+    if min_area is not None:
+        floor = gross_floor(min_area, rules) if rules.net_min_area else min_area
+    elif rules.net_min_area and completed:
+        floor = gross_floor(layout.min_area, rules)
+    issues = tuple(issue for issue in layout.issues if issue.code != STOPPED)
     return State(
-        layout=layout.replace(
-            issues=tuple(issue for issue in layout.issues if issue.code != STOPPED)
-        ),
+        layout=layout.replace(issues=issues, min_area=floor),
         params=params,
-        min_area=gross_floor(layout.min_area, rules) if net else layout.min_area,
-        level=int(told[-1][LEVEL]),
-        blocks_divided=bool(told[-1][BLOCKS_DIVIDED]),
+        min_area=floor,
+        level=int(results[LEVEL]),
+        blocks_divided=bool(results[BLOCKS_DIVIDED]),
+        completed=completed,
     )
+
+
+def _begun_with(history: Sequence[Step], min_area: float | None) -> dict[str, Any] | None:
+    """Values of the parameters that a layout goes on with; None where nothing says them.
+
+    They are those of its last co-generation. A smallest area that was given since, in going on,
+    takes the place of the size they had.
+    """
+    values: dict[str, Any] | None = None
+    sizes: list[float | None] = []
+    for step in history:
+        if step.algorithm == ALGORITHM:
+            values, sizes = {**step.parameters, "stop_at_level": None}, []
+        elif LEVEL in step.results:
+            sizes.append(step.parameters.get("min_area"))
+    if values is not None and not any(LEVEL in step.results for step in history):
+        values = None  # an older version made it, whose levels are not known
+    given = [size for size in (*sizes, min_area) if size is not None]
+    if not given:
+        return values
+    # streets of layers have no rights-of-way unless somebody laid them out
+    begun = {"right_of_way": False} if values is None else values
+    return {**begun, "min_area": given[-1], "parcels": None}
 
 
 def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str, float]]:
@@ -301,7 +364,7 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
         The layout, and what the optimization gained.
     """
     params = state.params
-    layout = state.layout
+    layout = state.layout.replace(issues=_not_found_at_the_end(state.layout.issues))
     if params.rules.recut:
         layout = recut_irregular(
             layout,
@@ -313,7 +376,7 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
     layout = join_along_rims(layout, params)
     layout = layout.replace(min_area=_promised_area(state, layout))
-    results = _results(state)
+    results = progress_of(dataclasses.replace(state, completed=True))
     if params.optimize:
         optimized = optimize_geometry(
             layout,
@@ -328,6 +391,10 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
     layout = _with_net_floor(choose_entries(canonical(layout), params), params)
     missed = (*findings(layout, params), *missed_dimensions(layout, params))
     return _settled(layout).replace(issues=(*layout.issues, *missed)), results
+
+
+def _not_found_at_the_end(issues: tuple[Issue, ...]) -> tuple[Issue, ...]:
+    return tuple(issue for issue in issues if issue.code not in FOUND_AT_THE_END)
 
 
 def _settled(layout: Layout) -> Layout:
