@@ -179,8 +179,8 @@ def check_large_enough(moment: Moment, faces: Sequence[int]) -> None:
     too = "is too small" if len(small) == 1 else "are too small"
     size = f" ({area[small[0]]:,.0f} m²)" if len(small) == 1 else ""
     raise EditError(
-        f"{named[0].upper()}{named[1:]}{size} {too} to be cut in two: the smallest parcel allowed is "
-        f"{least:,.0f} m²."
+        f"{named[0].upper()}{named[1:]}{size} {too} to be cut in two: the smallest parcel "
+        f"allowed is {least:,.0f} m²."
     )
 
 
