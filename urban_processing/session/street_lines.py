@@ -16,9 +16,10 @@ import shapely
 from urban_processing.errors import EditError
 from urban_processing.layout import EdgeKind, Layout
 from urban_processing.mesh.planar import FloatArray, IntArray
-from urban_processing.session.cutting import Spot, check_can_be_cut, spot_on
+from urban_processing.session.cutting import check_can_be_cut
 from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine
 from urban_processing.session.moment import Moment
+from urban_processing.session.spots import Spot, spot_on
 
 CROSSING = 4.0
 """A run near boundaries is a crossing if it is shorter than so many times the snap distance."""
@@ -183,6 +184,8 @@ class _Planner:
     ) -> None:
         self.layout, self.line, self.segments = layout, line, segments
         self.snap, self.end_snap = snap, end_snap
+        self.crossed, edge = line.crossings(segments, beyond=end_snap)
+        self.sides = layout.mesh.face.reshape(-1, 2)[edge]
 
     def meet(self, before: int | None, after: int | None, start: float, stop: float) -> list[Spot]:
         """The spots of a near run: one where it is a crossing, else where it comes and leaves.
@@ -244,8 +247,7 @@ class _Planner:
         """
         sign = 1.0 if stop >= start else -1.0
         snap = max(self.snap, self.end_snap if stop in (0.0, self.line.length) else 0.0)
-        h = self.layout.mesh.face_half_edges(face)
-        at = self.line.crossings(self.segments[h >> 1], beyond=snap)
+        at = self.crossed[(self.sides == face).any(axis=1)]
         ahead = sign * (at - start)
         ahead = ahead[(ahead >= -SAME_PLACE)]
         room = abs(stop - start)
