@@ -181,7 +181,7 @@ def test_what_is_street_stays_and_remembers() -> None:
         ([0.0, 50.0, 3.0], "list of points"),
         ([(0, 0), (400, 400), (400, 0), (0, 300)], "crosses itself"),
         ([(900, 900), (999, 999)], "does not touch the land"),
-        ([(0, 50), (500, 50)], "leaves the land: end it at the land's rim"),
+        ([(350, 30), (450, 50), (450, 80), (350, 90)], "leaves the land: end it at"),
         ([(0, 50), (100, 50)], "ends inside parcel 1: draw it on to"),
         ([(100, 50), (400, 50)], "begins inside parcel 1: draw it on to"),
         ([(0, 200), (400, 200)], "crosses a lake"),
@@ -192,6 +192,16 @@ def test_what_is_street_stays_and_remembers() -> None:
 def test_drawn_lines_refused(line: object, words: str) -> None:
     moment = moment_of(SQUARE if "inside parcel 1" in words else LAKE)
     assert words in refusal(moment, line, snap=1.0)
+
+
+def test_what_is_drawn_beyond_the_rim_is_left_out() -> None:
+    moment = moment_of(SQUARE)
+    exact, _ = add_street(moment, np.array([(0, 50), (400, 50)]), snap=1.0, follow=False, given=ANY)
+    beyond, said = add_street(
+        moment, np.array([(-70, 50), (200, 50), (500, 50)]), snap=1.0, follow=False, given=ANY
+    )
+    assert said == "A street of 400 m was added; it cut parcel 1"
+    assert beyond.layout.digest == exact.layout.digest
 
 
 def test_small_halves_are_named() -> None:

@@ -21,7 +21,14 @@ from urban_processing.session.cutting import (
 from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine, as_line, as_points
 from urban_processing.session.moment import Moment
 from urban_processing.session.spots import with_vertices
-from urban_processing.session.street_lines import AT_LAKE, Link, Plan, barred_edges, plan_street
+from urban_processing.session.street_lines import (
+    AT_LAKE,
+    Link,
+    Plan,
+    barred_edges,
+    ending_at_rims,
+    plan_street,
+)
 from urban_processing.session.ways import costs_near, way_along_corners, way_between
 from urban_processing.session.wording import parcels_named
 from urban_processing.streets.network import street_network
@@ -81,7 +88,7 @@ def add_street(
         cut: list[int] = []
         edges = way_along_corners(state.layout, as_points(line), reach=snap)
     else:
-        drawn = as_line(line, tolerance=THINNED * snap)
+        drawn = ending_at_rims(state.layout, as_line(line, tolerance=THINNED * snap))
         state, edges, cut = _drawn_street(moment, drawn, snap)
     layout = state.layout
     new = edges[~layout.edge_street[edges]]
