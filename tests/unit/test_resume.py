@@ -19,7 +19,7 @@ import urban_processing as up
 from urban_processing.cli.app import app
 from urban_processing.errors import BoundaryError, ParameterError, UrbanError
 from urban_processing.io.frames import GeoLayout
-from urban_processing.layout_file.files import STAGES_SINCE
+from urban_processing.layout_file.reading import STAGES_SINCE
 
 RUNS = {
     "area": ["--min-area", "30000"],

@@ -12,7 +12,7 @@ from urban_processing.mesh.planar import FloatArray
 from urban_processing.session.moment import Moment
 from urban_processing.session.reading import Place
 
-SNAP_SHARE, LEAST_SNAP = 0.02, 0.05
+SNAP_SHARE, LEAST_SNAP = 0.1, 0.05
 """A drawn line lies on a boundary within this share of the side of a parcel of the smallest area,
 and within `LEAST_SNAP` metres at least."""
 
@@ -33,7 +33,7 @@ def face_of(moment: Moment, parcel: int | Place) -> int:
         return moment.face(parcel)
     face = moment.face_at(local(moment, (parcel,))[0])
     if face is None:
-        raise EditError(f"There is no parcel at {parcel[0]:g}, {parcel[1]:g}.")
+        raise EditError(f"There is no parcel at {parcel[0]:.1f}, {parcel[1]:.1f}.")
     return face
 
 
