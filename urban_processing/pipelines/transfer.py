@@ -173,7 +173,21 @@ def _said(made: Transfer, editions: Editions) -> list[Issue]:
             "numbers are new. Do the layers show the same place?"
         )
         issues.append(Issue(NOTHING_IN_COMMON, message))
+    elif _are_apart(editions):
+        message = (
+            f"{editions.before.name} and {editions.after.name} have no land in common: what was "
+            "found again lies elsewhere. Do the layers show the same place?"
+        )
+        issues.append(Issue(NOTHING_IN_COMMON, message))
     return issues
+
+
+def _are_apart(editions: Editions) -> bool:
+    """Whether the extents of both states do not meet."""
+    before, after = (
+        shapely.box(*shapely.total_bounds(e.polygons)) for e in (editions.before, editions.after)
+    )
+    return not shapely.intersects(before, after)
 
 
 def _carried(
