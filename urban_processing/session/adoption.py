@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.assembly import assemble_layout
+from urban_processing.assembly import Kept, assemble_layout
 from urban_processing.errors import BoundaryError, EditError
 from urban_processing.hashing import child
 from urban_processing.layout import (
@@ -68,8 +68,7 @@ def adopt(
             streets,
             frame=before.frame,
             snap=snap,
-            min_area=before.min_area,
-            obstacles=before.obstacles,
+            kept=Kept(min_area=before.min_area, obstacles=before.obstacles),
         )
     except BoundaryError as error:
         raise EditError(error.problems) from error
