@@ -111,7 +111,10 @@ def edits(session: Any, cuttable: list[int], each: int) -> Iterator[tuple[str, d
         a, b = box[:2].mean(axis=0), box[2:4].mean(axis=0)
         if np.hypot(*(box[1] - box[0])) < np.hypot(*(box[2] - box[1])):
             a, b = box[1:3].mean(axis=0), box[3:5].mean(axis=0)
-        yield "cut", {"parcel": number, "line": origin + np.array([a + 0.1 * (a - b), b - 0.1 * (a - b)])}
+        yield (
+            "cut",
+            {"parcel": number, "line": origin + np.array([a + 0.1 * (a - b), b - 0.1 * (a - b)])},
+        )
     some = [session.parcels[f] for f in spread(mesh.n_faces, each)]
     for number in some:
         yield "undo_cut", {"parcel": number}

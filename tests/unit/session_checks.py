@@ -12,6 +12,7 @@ import shapely
 from urban_processing.access_rule import unreached_parcels_of
 from urban_processing.layout import NOT_FIXED, Layout
 from urban_processing.mesh.components import components
+from urban_processing.rebuild import canonical
 from urban_processing.session.session import Session
 from urban_processing.site import AREA_ROUNDING
 
@@ -47,8 +48,10 @@ class Seen:
     smallest: float
 
     @classmethod
-    def of(cls, session: Session) -> Seen:
-        """What there is now."""
+    def of(cls, session: Session, *edits: str) -> Seen:
+        """What there is now, or after some more edits."""
+        for name in edits:
+            session.do(name)
         layout = session.layout
         return cls(layout, session.parcels, layout.mesh.face_polygons(), layout.min_area)
 
@@ -128,9 +131,23 @@ def assert_requirements(before: Seen, after: Seen) -> None:
         assert number in was_small or known, f"parcel {number} has {area} m²"
 
 
+def assert_same(one: Seen, other: Seen) -> None:
+    """Two layouts are the same but for the order of vertices and edges, and what is in words."""
+    a, b = canonical(one.layout), canonical(other.layout)
+    assert a.digest == b.digest
+    for each in dataclasses.fields(Layout):
+        value = getattr(a, each.name)
+        if isinstance(value, np.ndarray):
+            assert np.array_equal(value, getattr(b, each.name)), each.name
+    assert a.land_uses == b.land_uses
+    assert str(a.fixed_streets) == str(b.fixed_streets)
+
+
 def assert_numbers_stay(before: Seen, after: Seen) -> None:
     """Parcels that are where they were have the numbers that they had."""
-    where = {shapely.normalize(p).wkb: n for p, n in zip(before.polygons, before.parcels, strict=True)}
+    where = {
+        shapely.normalize(p).wkb: n for p, n in zip(before.polygons, before.parcels, strict=True)
+    }
     for polygon, number in zip(after.polygons, after.parcels, strict=True):
         was = where.get(shapely.normalize(polygon).wkb, number)
         assert was == number, f"parcel {was} is {number} now"

@@ -24,6 +24,7 @@ from urban_processing.pipelines.levels import (
 )
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
+from urban_processing.rebuild import canonical
 from urban_processing.session import files
 from urban_processing.session.edits import Edit, make_edit
 from urban_processing.session.figures import figures
@@ -100,8 +101,9 @@ class Session:
         BoundaryError
             If co-generation did not make it.
         """
-        state = state_of(layout)
-        return cls(state, files.start_with_layout(layout, state.params))
+        # numbered by the parcels alone, so that the layout's file is the same start
+        state = state_of(canonical(layout))
+        return cls(state, files.start_with_layout(state.layout, state.params))
 
     # what there is now
 
@@ -333,13 +335,13 @@ class Session:
     def branches(self) -> tuple[Branch, ...]:
         """The ends of all that was done, also of what was undone and gone on from otherwise."""
         timeline = self._timeline
-        path = timeline.path()
+        last = timeline.last()
         return tuple(
             Branch(
                 number=tip,
                 sentence=timeline.entries[tip].sentence,
                 edits=len(timeline.path(tip)) - 1,
-                current=timeline.now in timeline.path(tip) and _follows(timeline, path, tip),
+                current=tip == last,
             )
             for tip in timeline.tips()
         )
@@ -370,7 +372,10 @@ class Session:
         done = [
             (entry.edit, entry.before) for entry in self._timeline.entries if entry.edit is not None
         ]
-        saved = files.as_json(self._start, done, current=self._timeline.now, layout=self.layout)
+        timeline = self._timeline
+        saved = files.as_json(
+            self._start, done, current=timeline.now, redo=timeline.last(), layout=self.layout
+        )
         return files.save(path, saved, overwrite=overwrite)
 
     @classmethod
@@ -428,6 +433,7 @@ class Session:
                 where = f"{saved.path}, edit {i + 1} ({edit.name})"
                 raise EditError(f"{where}: {problem}" for problem in error.problems) from error
             numbers.append(self._timeline.now)
+        self._timeline.go_to(numbers[saved.redo])
         self._timeline.go_to(numbers[saved.current])
 
 
@@ -449,11 +455,3 @@ def _change(before: Moment, after: Moment, sentence: str) -> Change:
 
 def _in_clause(sentence: str) -> str:
     return sentence[:1].lower() + sentence[1:]
-
-
-def _follows(timeline: Timeline, path: list[int], tip: int) -> bool:
-    """Whether redo leads from the end of a path to a tip."""
-    at = path[-1]
-    while at in timeline.ahead and at != tip:
-        at = timeline.ahead[at]
-    return at == tip

@@ -242,9 +242,7 @@ class _Ragged(dict[int, list[int]]):
         return found
 
 
-def _successors(
-    graph: CornerGraph, usable: BoolArray
-) -> tuple[_Ragged, _Ragged, list[int]]:
+def _successors(graph: CornerGraph, usable: BoolArray) -> tuple[_Ragged, _Ragged, list[int]]:
     """Usable chains that continue each chain straight on and with a turn; the straightest."""
     n = graph.n_chains
     counts = np.diff(graph.out_offsets)[graph.end]

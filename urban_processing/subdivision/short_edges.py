@@ -42,9 +42,7 @@ class _Merge:
     faces: list[int]
 
 
-def remove_short_edges(
-    layout: Layout, *, min_area: float, faces: IntArray | None = None
-) -> Layout:
+def remove_short_edges(layout: Layout, *, min_area: float, faces: IntArray | None = None) -> Layout:
     """Merge the ends of short parcel sides; the sides that meet there follow.
 
     A merge is done only if all parcels around stay simple, at or above `min_area`, no less
