@@ -106,7 +106,7 @@ class SessionMachine(RuleBasedStateMachine):
         after = self.look()
         assert set(change.new) == set(after.parcels) - set(before.parcels)
         assert set(change.gone) == set(before.parcels) - set(after.parcels)
-        assert_requirements(before, after)
+        assert_requirements(before, after, is_level=name == "step")
         assert_numbers_stay(before, after)
         if name not in ("unlock", "adopt", "merge"):
             assert_locked_stay(before, after)
@@ -338,7 +338,7 @@ def _polygons(mesh: PlanarMesh, xy: np.ndarray) -> np.ndarray:
 
 TestSession = SessionMachine.TestCase
 TestSession.settings = settings(
-    max_examples=12,
+    max_examples=20,
     stateful_step_count=14,
     deadline=None,
     derandomize=True,
