@@ -1,0 +1,191 @@
+"""The two layers that show a session, kept up to date feature by feature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import Any
+
+from qgis.core import (
+    QgsFeature,
+    QgsFeatureRequest,
+    QgsFeatureSink,
+    QgsFields,
+    QgsGeometry,
+    QgsLayerTreeGroup,
+    QgsPointXY,
+    QgsProject,
+    QgsRectangle,
+    QgsVectorLayer,
+)
+from qgis.PyQt.QtCore import QObject, pyqtSignal
+
+from qgis_plugin.crs import crs_of
+from qgis_plugin.steering.fields import parcel_columns, parcel_fields, street_columns, street_fields
+from qgis_plugin.steering.model import Difference
+from qgis_plugin.steering.style import style_parcels, style_streets
+from qgis_plugin.texts import tr
+from urban_processing.schema import Column
+
+
+class SteeringLayers(QObject):
+    """Parcels and streets of a session in the project's layer tree."""
+
+    hand_edited = pyqtSignal()
+    """Somebody edits one of the layers, or does so no more."""
+
+    gone = pyqtSignal()
+    """Somebody took one of the layers out of the project."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.parcels = _ShownLayer(self, "Polygon", parcel_fields(), parcel_columns())
+        self.streets = _ShownLayer(self, "LineString", street_fields(), street_columns())
+        self._both = (self.parcels, self.streets)
+
+    @property
+    def are_there(self) -> bool:
+        """Whether both layers are in the project."""
+        return all(shown.layer is not None for shown in self._both)
+
+    @property
+    def are_edited(self) -> bool:
+        """Whether somebody edits the layers, or has edited them since the session was shown."""
+        return any(shown.is_edited for shown in self._both)
+
+    def make(self, crs: str) -> None:
+        """Put empty layers into the project, instead of those that are left of others."""
+        self.remove()
+        group = QgsProject.instance().layerTreeRoot().insertGroup(0, tr("Steering"))
+        self.streets.make(tr("Streets (steering)"), crs, group, style_streets)
+        self.parcels.make(tr("Parcels (steering)"), crs, group, style_parcels)
+
+    def remove(self) -> None:
+        """Take the layers out of the project, and their group if nothing else is in it."""
+        for shown in self._both:
+            shown.remove()
+
+    def show(self, difference: Difference) -> None:
+        """Change the features that differ."""
+        whole = difference.whole
+        self.parcels.change(difference.parcels_gone, difference.parcels, whole=whole)
+        self.streets.change(difference.streets_gone, difference.streets, whole=whole)
+
+    def undo_hand_edits(self) -> None:
+        """Leave the layers' edit mode without keeping anything."""
+        for shown in self._both:
+            shown.roll_back()
+
+    def drawn(self) -> tuple[list[bytes], list[bytes]]:
+        """Return the geometries of parcels and streets as they were edited, as WKB."""
+        return self.parcels.drawn(), self.streets.drawn()
+
+
+class _ShownLayer:
+    """One of the layers, and which feature shows what."""
+
+    def __init__(
+        self, owner: SteeringLayers, kind: str, fields: QgsFields, columns: Iterable[Column]
+    ) -> None:
+        self._owner = owner
+        self._kind = kind
+        self._fields = fields
+        self._columns = tuple(columns)
+        self._ids: dict[Hashable, int] = {}
+        self._touched = False
+        self.layer: QgsVectorLayer | None = None
+
+    @property
+    def is_edited(self) -> bool:
+        return self.layer is not None and (self._touched or self.layer.isEditable())
+
+    def make(
+        self, title: str, crs: str, group: QgsLayerTreeGroup, style: Callable[[Any], None]
+    ) -> None:
+        layer = QgsVectorLayer(self._kind, title, "memory")
+        layer.setCrs(crs_of(crs))
+        layer.dataProvider().addAttributes(self._fields.toList())
+        layer.updateFields()
+        layer.dataProvider().createSpatialIndex()
+        for column in self._columns:
+            layer.setFieldAlias(layer.fields().lookupField(column.name), column.label)
+        style(layer)
+        self.layer, self._ids, self._touched = layer, {}, False
+        QgsProject.instance().addMapLayer(layer, False)
+        group.addLayer(layer)
+        layer.willBeDeleted.connect(self._forget)
+        for signal in (layer.editingStarted, layer.editingStopped):
+            signal.connect(self._owner.hand_edited)
+        for signal in (
+            layer.committedFeaturesAdded,
+            layer.committedFeaturesRemoved,
+            layer.committedGeometriesChanges,
+        ):
+            signal.connect(self._touch)
+
+    def remove(self) -> None:
+        layer = self.layer
+        if layer is None:
+            return
+        layer.willBeDeleted.disconnect(self._forget)
+        self._drop()
+        node = QgsProject.instance().layerTreeRoot().findLayer(layer.id())
+        group = None if node is None else node.parent()
+        layer.rollBack()
+        QgsProject.instance().removeMapLayer(layer.id())
+        if group is not None and group.parent() is not None and not group.children():
+            group.parent().removeChildNode(group)
+
+    def change(
+        self, gone: Iterable[Hashable], come: Mapping[Any, QgsFeature], *, whole: bool
+    ) -> None:
+        if self.layer is None:
+            return
+        provider = self.layer.dataProvider()
+        if whole:
+            provider.truncate()
+            self._ids, self._touched = {}, False
+        else:
+            ids = [self._ids.pop(key) for key in gone if key in self._ids]
+            if ids:
+                provider.deleteFeatures(ids)
+        if come:
+            done, added = provider.addFeatures(list(come.values()), QgsFeatureSink.Flag.FastInsert)
+            if not done:
+                raise OSError(f"The layer {self.layer.name()} could not be changed.")
+            self._ids.update(zip(come, (feature.id() for feature in added), strict=True))
+        self.layer.updateExtents()
+        self.layer.triggerRepaint()
+
+    def roll_back(self) -> None:
+        if self.layer is not None and self.layer.isEditable():
+            self.layer.rollBack()
+
+    def drawn(self) -> list[bytes]:
+        if self.layer is None:
+            return []
+        request = QgsFeatureRequest().setNoAttributes()
+        shapes = (feature.geometry() for feature in self.layer.getFeatures(request))
+        return [bytes(shape.asWkb()) for shape in shapes if not shape.isNull()]
+
+    def nearest(self, place: QgsPointXY, reach: float) -> QgsGeometry | None:
+        """Return the geometry that is nearest to a place, no farther than `reach`."""
+        if self.layer is None:
+            return None
+        around = QgsRectangle.fromCenterAndSize(place, 2 * reach, 2 * reach)
+        request = QgsFeatureRequest().setFilterRect(around).setNoAttributes()
+        here = QgsGeometry.fromPointXY(place)
+        found = [feature.geometry() for feature in self.layer.getFeatures(request)]
+        near = [(shape.distance(here), i) for i, shape in enumerate(found)]
+        best = min(near, default=(reach, -1))
+        return found[best[1]] if best[1] >= 0 and best[0] <= reach else None
+
+    def _touch(self) -> None:
+        self._touched = True
+        self._owner.hand_edited.emit()
+
+    def _forget(self) -> None:
+        self._drop()
+        self._owner.gone.emit()
+
+    def _drop(self) -> None:
+        self.layer, self._ids, self._touched = None, {}, False
