@@ -38,3 +38,22 @@ def mix(value: int) -> int:
 def child(parent: int, rank: int) -> int:
     """Return the lineage of the part of a thing that has a rank among its parts."""
     return mix(parent ^ mix(rank + 1))
+
+
+def unmixed(values: UintArray) -> UintArray:
+    """Return what `splitmix64` mixed: it maps the 64-bit integers one to one."""
+    z = _unshifted(values, 31) * np.uint64(_inverse(0x94D049BB133111EB))
+    z = _unshifted(z, 27) * np.uint64(_inverse(0xBF58476D1CE4E5B9))
+    return _unshifted(z, 30) - np.uint64(0x9E3779B97F4A7C15)
+
+
+def _unshifted(values: UintArray, bits: int) -> UintArray:
+    """Solve ``z ^ (z >> bits) == values`` for z."""
+    z = values
+    for _ in range(64 // bits):
+        z = values ^ (z >> np.uint64(bits))
+    return z
+
+
+def _inverse(odd: int) -> int:
+    return pow(odd, -1, _MASK + 1)

@@ -45,6 +45,8 @@ class Stage(enum.IntEnum):
     """The next level cuts it, if it is large enough."""
     AHEAD = 2
     """It has its cut of the next level already; the level after that goes on with it."""
+    BEHIND = 3
+    """Its cut of a level before was undone: the next level cuts it, unless somebody does."""
 
 
 class Steering(enum.IntFlag):

@@ -201,7 +201,8 @@ PARCELS = Layer(
             "stage",
             "Stage",
             "Whether co-generation goes on with the parcel: done; open, to be cut at the next "
-            "level if it is large enough; ahead, if it has its cut of that level already.",
+            "level if it is large enough; ahead, if it has its cut of that level already; behind, "
+            "if a cut that it had was undone.",
         ),
         _integer(
             "quota",

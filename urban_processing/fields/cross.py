@@ -47,8 +47,8 @@ class FieldGrid:
         fx = (z.real - self.low.real[parcel]) / self.step.real[parcel]
         fy = (z.imag - self.low.imag[parcel]) / self.step.imag[parcel]
         top = self.size - 2
-        i = np.clip(fx.astype(np.int64), 0, top)
-        j = np.clip(fy.astype(np.int64), 0, top)
+        i = np.minimum(np.maximum(fx.astype(np.int64), 0), top)
+        j = np.minimum(np.maximum(fy.astype(np.int64), 0), top)
         return (parcel * self.size + j) * self.size + i, fx - i, fy - j
 
     def crosses(self, parcel: IntArray, z: ComplexArray) -> ComplexArray:

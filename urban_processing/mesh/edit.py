@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,13 @@ class MeshEditor:
         self.face_parent: list[int] = list(range(mesh.n_faces))
         self.dropped_faces: set[int] = set()
         self._n_old_vertices = mesh.n_vertices
+
+    def copy(self) -> MeshEditor:
+        """Return an editor in the same state that is edited by itself."""
+        other = object.__new__(MeshEditor)
+        for name, value in vars(self).items():
+            setattr(other, name, copy.copy(value))
+        return other
 
     def ring(self, half_edge: int) -> list[int]:
         """Half-edges of the loop that `half_edge` belongs to, beginning with it."""

@@ -15,7 +15,12 @@ ObjectArray = npt.NDArray[np.object_]
 
 
 def changes_table(
-    made: Transfer, old: tuple[IntArray, ObjectArray], new: ObjectArray, frame: Frame
+    made: Transfer,
+    old: tuple[IntArray, ObjectArray],
+    new: ObjectArray,
+    frame: Frame,
+    *,
+    new_id: IntArray | None = None,
 ) -> Table:
     """Return one row for each parcel after, then one for each number that ended.
 
@@ -29,10 +34,15 @@ def changes_table(
         Polygons of the parcels after.
     frame
         Where their local coordinates lie.
+    new_id
+        Numbers of the parcels after, where they have others than were carried over.
     """
     log, m = made.changes, len(made.parcel_id)
     shape = np.append(new, old[1][log.old[m:]])
-    number = numbers_of(old[0], log.old), numbers_of(made.parcel_id, log.new)
+    number = (
+        numbers_of(old[0], log.old),
+        numbers_of(made.parcel_id if new_id is None else new_id, log.new),
+    )
     order = np.lexsort((number[0], number[1], np.arange(len(shape)) >= m))
     values = {
         "change": log.change,

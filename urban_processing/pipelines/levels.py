@@ -51,8 +51,19 @@ RECUT_SHARE, PRUNED_SHARE = 0.6, 0.7
 ALGORITHM = "cogenerate"
 """Name of the algorithm in provenance."""
 
-LEVEL, BLOCKS_DIVIDED = "level", "blocks_divided"
+LEVEL, BLOCKS_DIVIDED, FINISHED = "level", "blocks_divided", "finished"
 """Results in provenance that tell how far the levels have come."""
+
+FOUND_AT_THE_END = frozenset(
+    {
+        *("block_below_min_area", "block_length_missed", "block_too_long", "count_missed"),
+        *("dead_end", "entry_chosen", "fixed_dead_end", "frontage_missed", "no_entry"),
+        *("parcel_cut_off", "parcel_not_cut", "parcel_not_reached", "parcel_swallowed"),
+        *("part_below_min_area", "part_not_reached", "remnant", "street_on_rim"),
+        "width_depth_missed",
+    }
+)
+"""Codes of the issues that `finish` finds; those of an earlier end are found anew."""
 
 STOPPED = "stopped"
 """Code of the issue that says at which level a layout stopped."""
@@ -78,6 +89,8 @@ class State:
         Number of levels so far.
     blocks_divided
         Whether another strategy than streamlines has done its last levels.
+    completed
+        Whether the layout has been through `finish`.
     """
 
     layout: Layout
@@ -85,6 +98,7 @@ class State:
     min_area: float
     level: int = 0
     blocks_divided: bool = False
+    completed: bool = False
 
     @property
     def floor(self) -> float:
@@ -98,7 +112,7 @@ class State:
 
     def to_cut(self) -> IntArray:
         """Parcels that the next level cuts."""
-        return self._large_enough(Stage.OPEN)
+        return self._large_enough(Stage.OPEN, Stage.BEHIND)
 
     def _large_enough(self, *stages: Stage) -> IntArray:
         layout, mesh = self.layout, self.layout.mesh
@@ -110,14 +124,18 @@ class State:
     @property
     def finished(self) -> bool:
         """Whether no level is to come any more."""
-        return not self.divides_blocks and not len(self._large_enough(Stage.OPEN, Stage.AHEAD))
+        return not self.divides_blocks and not len(self._left())
+
+    def _left(self) -> IntArray:
+        """Parcels that this or a later level cuts."""
+        return self._large_enough(Stage.OPEN, Stage.BEHIND, Stage.AHEAD)
 
     @property
     def divides_blocks(self) -> bool:
         """Whether the next level divides the blocks by another strategy than streamlines."""
         if self.blocks_divided or self.params.strategy is Strategy.STREAMLINE:
             return False
-        return not len(self._large_enough(Stage.OPEN, Stage.AHEAD))
+        return not len(self._left())
 
 
 def smallest_area(site: Site, params: CogenerateParams) -> float:
@@ -256,11 +274,16 @@ def pause(state: State) -> tuple[Layout, dict[str, float]]:
     )
     layout = canonical(state.layout)
     issue = Issue(STOPPED, message, value=float(state.level))
-    return layout.replace(issues=(*layout.issues, issue)), _results(state)
+    return layout.replace(issues=(*layout.issues, issue)), progress_of(state)
 
 
-def _results(state: State) -> dict[str, float]:
-    return {LEVEL: float(state.level), BLOCKS_DIVIDED: float(state.blocks_divided)}
+def progress_of(state: State) -> dict[str, float]:
+    """What provenance tells of how far a state has come, for `state_of`."""
+    return {
+        LEVEL: float(state.level),
+        BLOCKS_DIVIDED: float(state.blocks_divided),
+        FINISHED: float(state.completed),
+    }
 
 
 def state_of(layout: Layout) -> State:
@@ -280,7 +303,8 @@ def state_of(layout: Layout) -> State:
         )
     params = CogenerateParams.from_values({**made[-1].parameters, "stop_at_level": None})
     rules = params.street_rules
-    net = rules.net_min_area and not any(issue.code == STOPPED for issue in layout.issues)
+    completed = bool(told[-1].get(FINISHED))
+    net = rules.net_min_area and completed
     return State(
         layout=layout.replace(
             issues=tuple(issue for issue in layout.issues if issue.code != STOPPED)
@@ -289,6 +313,7 @@ def state_of(layout: Layout) -> State:
         min_area=gross_floor(layout.min_area, rules) if net else layout.min_area,
         level=int(told[-1][LEVEL]),
         blocks_divided=bool(told[-1][BLOCKS_DIVIDED]),
+        completed=completed,
     )
 
 
@@ -301,7 +326,7 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
         The layout, and what the optimization gained.
     """
     params = state.params
-    layout = state.layout
+    layout = state.layout.replace(issues=_not_found_at_the_end(state.layout.issues))
     if params.rules.recut:
         layout = recut_irregular(
             layout,
@@ -313,7 +338,7 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
     layout = prune_streets(layout, params, keep_ends=params.pattern is not StreetPattern.LOOP)
     layout = join_along_rims(layout, params)
     layout = layout.replace(min_area=_promised_area(state, layout))
-    results = _results(state)
+    results = progress_of(dataclasses.replace(state, completed=True))
     if params.optimize:
         optimized = optimize_geometry(
             layout,
@@ -328,6 +353,10 @@ def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str,
     layout = _with_net_floor(choose_entries(canonical(layout), params), params)
     missed = (*findings(layout, params), *missed_dimensions(layout, params))
     return _settled(layout).replace(issues=(*layout.issues, *missed)), results
+
+
+def _not_found_at_the_end(issues: tuple[Issue, ...]) -> tuple[Issue, ...]:
+    return tuple(issue for issue in issues if issue.code not in FOUND_AT_THE_END)
 
 
 def _settled(layout: Layout) -> Layout:

@@ -30,6 +30,8 @@ class Candidate:
         One sentence that says what speaks for it and against it.
     cut
         The cut in terms of the mesh.
+    tee_snap
+        Distance, in √area, within which its ends move to where a neighbour's cut ends.
     """
 
     rank: int
@@ -39,6 +41,7 @@ class Candidate:
     areas: tuple[float, float]
     reason: str
     cut: Cut
+    tee_snap: float
 
 
 @dataclass(frozen=True)
@@ -58,3 +61,25 @@ class Change:
     sentence: str
     gone: tuple[int, ...] = ()
     new: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Branch:
+    """The end of a line of edits.
+
+    Parameters
+    ----------
+    number
+        For `Session.go_to`.
+    sentence
+        What was done last on it.
+    edits
+        Number of its edits from the beginning.
+    current
+        Whether redo leads to it from now, or it is now.
+    """
+
+    number: int
+    sentence: str
+    edits: int
+    current: bool

@@ -75,6 +75,51 @@ def insert_cuts(
     return cut, done, parent
 
 
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A cut as it would be drawn.
+
+    Parameters
+    ----------
+    path
+        (n, 2) points of the cut, its ends on the ring of the parcel.
+    areas
+        Areas in m² of the halves to its left and to its right.
+    snap
+        Distance within which its ends were moved, in √area.
+    """
+
+    path: FloatArray
+    areas: tuple[float, float]
+    snap: float
+
+
+def try_cuts(
+    layout: Layout,
+    parcels: ParcelRings,
+    cuts: Sequence[Cut],
+    *,
+    min_area: float,
+    tee_snap: float = TEE_SNAP,
+) -> list[Trial | None]:
+    """Draw each of several cuts of one parcel as `insert_cuts` would, the layout unchanged.
+
+    None stands for a cut that leaves no two legal halves.
+    """
+    inserter = _Inserter(layout, parcels, min_area, attached=True)
+    untouched = inserter.editor
+    out: list[Trial | None] = []
+    for cut in cuts:
+        found = None
+        for snap in (tee_snap, 0.0):
+            inserter.editor = untouched.copy()
+            found = inserter.trial(cut, snap)
+            if found is not None:
+                break
+        out.append(found)
+    return out
+
+
 class _Inserter:
     """The editor with what is needed to draft, check and draw cuts."""
 
@@ -183,6 +228,21 @@ class _Inserter:
                 self.editor.connect(ha, hb, [(x, y) for x, y in draft.path[1:-1].tolist()])
                 done.append(draft.row)
         return done
+
+    def trial(self, cut: Cut, snap: float) -> Trial | None:
+        """The cut of the only parcel as it would be drawn; None where it is not legal."""
+        draft = self.draft(0, cut, snap)
+        if draft is None:
+            return None
+        [draft] = self._simplified([draft])
+        ring = self._ring_vertices(draft)
+        if not self._legal([draft], [ring])[0]:
+            return None
+        k = ring.index(draft.stop)
+        left = np.concatenate([draft.path[:-1], [self._xy(v) for v in ring[k:]]])
+        area = float(shapely.area(shapely.polygons(left)))
+        whole = float(self.layout.mesh.face_area[self.parcels.face[0]])
+        return Trial(draft.path, (area, whole - area), snap)
 
     def _simplified(self, drafts: list[_Draft]) -> list[_Draft]:
         if not drafts:

@@ -40,18 +40,37 @@ WANTED_WEIGHT = 2.0
 """Proportions count so many times as much where their ratio is given."""
 
 
+TERMS = (
+    *("size", "shape", "access", "clearance", "count", "frontage", "continuity"),
+    *("orientation", "variation"),
+)
+"""What the quality of a cut is the sum of: Qsize, Qregu and Qacce of Chen 2024, Eq. 2, then terms
+of the preset and of what was wished for; those that speak against a cut are negative."""
+
+
 FRONTAGE_WEIGHT = 1.0
 """Weight of halves without any of the least frontage; in proportion below."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredCuts:
-    """Candidates after snapping, with their quality; `quality` is -inf where a cut is illegal."""
+    """Candidates after snapping, with their quality.
+
+    Parameters
+    ----------
+    t_a, t_b
+        (C,) where the ends lie along the ring.
+    quality
+        (C,) sum of the terms; -inf where a cut is illegal.
+    terms
+        (C, T) what each of `TERMS` adds to the quality.
+    """
 
     cuts: Cuts
     t_a: FloatArray
     t_b: FloatArray
     quality: FloatArray
+    terms: FloatArray
 
 
 def score_cuts(
@@ -111,27 +130,29 @@ def score_cuts(
         ]
     elif params.width_depth is not None:
         shape = [left.by_proportions(), right.by_proportions()]
-    quality = (
-        w_size * _balance(smaller / larger, rules.size_cap)
-        + w_shape / (1.0 + shape[0] + shape[1])
-        + w_access * (1.0 + reached.all(axis=1))
-        - rules.clearance * np.clip(1.0 - cuts.clearance / CLEARANCE, 0.0, 1.0)
-    )
-    quality -= w_size * np.minimum(1.0, QUOTA_WEIGHT * _quota_misfit(area, parcel_quota))
+    terms = {
+        "size": w_size * _balance(smaller / larger, rules.size_cap),
+        "shape": w_shape / (1.0 + shape[0] + shape[1]),
+        "access": w_access * (1.0 + reached.all(axis=1)),
+        "clearance": -rules.clearance * np.clip(1.0 - cuts.clearance / CLEARANCE, 0.0, 1.0),
+        "count": -w_size * np.minimum(1.0, QUOTA_WEIGHT * _quota_misfit(area, parcel_quota)),
+    }
     if params.least_frontage is not None:
         # what has no street yet will have one along its shorter sides, as a rule
         later = np.column_stack([left.least_width, right.least_width])
         short = 1.0 - np.where(street > 0, street, later) / least
-        quality -= FRONTAGE_WEIGHT * np.clip(short, 0.0, 1.0).sum(axis=1)
+        terms["frontage"] = -FRONTAGE_WEIGHT * np.clip(short, 0.0, 1.0).sum(axis=1)
     if params.continuity > 0:
         ends = _continues(boundary, cuts.parcel, node_a, cuts.leaving).astype(np.float64)
         ends += _continues(boundary, cuts.parcel, node_b, -cuts.arriving)
-        quality += params.continuity * 0.5 * ends
+        terms["continuity"] = params.continuity * 0.5 * ends
     if params.orientation is not None and rules.prospect == 0:
         along = _oriented(b - a, ideal.preferred)
-        quality += params.weight_orientation * along
+        terms["orientation"] = params.weight_orientation * along
     if rules.variation > 0:
-        quality += rules.variation * _noise(cuts.parcel, lineage, params.seed)
+        terms["variation"] = rules.variation * _noise(cuts.parcel, lineage, params.seed)
+    by_term = np.column_stack([terms.get(name, np.zeros(len(area))) for name in TERMS])
+    quality = by_term.sum(axis=1)
     legal = (
         (smaller >= min_share[cuts.parcel] * (1.0 - AREA_ROUNDING)) & (left.n >= 3) & (right.n >= 3)
     )
@@ -143,12 +164,7 @@ def score_cuts(
     legal &= np.isfinite(quality) & (np.abs(b - a) > 1e-9)
     # rounded, so that ties are broken by index on every machine
     quality = np.where(legal, np.round(quality, 6), -np.inf)
-    return ScoredCuts(
-        cuts,
-        t_a,
-        t_b,
-        quality,
-    )
+    return ScoredCuts(cuts, t_a, t_b, quality, by_term)
 
 
 def _possible_frontage(
@@ -238,7 +254,9 @@ def _oriented(chord: ComplexArray, preferred: ComplexArray) -> FloatArray:
     return np.asarray(1.0 - 2.0 / np.pi * np.arccos(np.clip(np.abs(along), 0.0, 1.0)))
 
 
-def rank_cuts(boundary: Boundary, scored: ScoredCuts) -> tuple[IntArray, IntArray]:
+def rank_cuts(
+    boundary: Boundary, scored: ScoredCuts, alternatives: int = ALTERNATIVES
+) -> tuple[IntArray, IntArray]:
     """Best legal cuts of each parcel, best first, no two of them almost the same.
 
     Returns
@@ -250,7 +268,7 @@ def rank_cuts(boundary: Boundary, scored: ScoredCuts) -> tuple[IntArray, IntArra
     parcel = scored.cuts.parcel
     perimeter = boundary.perimeter[parcel]
     chosen, ranks = [], []
-    for rank in range(ALTERNATIVES):
+    for rank in range(alternatives):
         order = np.lexsort((-quality, parcel))
         order = order[np.isfinite(quality[order])]
         if len(order) == 0:

@@ -21,7 +21,7 @@ from urban_processing.subdivision.cuts import (
     streamline_cuts,
 )
 from urban_processing.subdivision.parcels import Boundary, ParcelRings, boundaries
-from urban_processing.subdivision.score import ScoredCuts, rank_cuts, score_cuts
+from urban_processing.subdivision.score import ALTERNATIVES, ScoredCuts, rank_cuts, score_cuts
 
 FIELD_TOLERANCE = 0.004
 """The field sees rings simplified by this share of √area: collinear vertices cost time."""
@@ -51,6 +51,8 @@ class Cut:
         (n, 2) map positions from near a to near b: snapping has moved the ends alone.
     quality
         Score, the larger the better.
+    terms
+        What each of `score.TERMS` adds to it.
     """
 
     edge_a: int
@@ -59,6 +61,7 @@ class Cut:
     along_b: float
     path: FloatArray
     quality: float
+    terms: tuple[float, ...] = ()
 
 
 def propose_cuts(
@@ -68,6 +71,7 @@ def propose_cuts(
     params: CogenerateParams,
     quota: IntArray | None = None,
     thorough: bool = False,
+    alternatives: int = ALTERNATIVES,
 ) -> list[list[Cut]]:
     """Ranked cuts of each parcel, best first; an empty list where no cut is legal.
 
@@ -79,6 +83,8 @@ def propose_cuts(
         (P,) number of parcels that each is to become in the end, where that is given.
     thorough
         More seeds, a finer field and no snapping, for parcels whose first cuts failed.
+    alternatives
+        Most cuts of one parcel.
     """
     out: list[list[Cut]] = [[] for _ in range(len(parcels.face))]
     field_vertices = simplified_vertices(parcels.xy, parcels.offsets, FIELD_TOLERANCE)
@@ -110,7 +116,7 @@ def propose_cuts(
             params=params,
             snap=0.0 if thorough else params.rules.snap,
         )
-        chosen, rank = rank_cuts(boundary, scored)
+        chosen, rank = rank_cuts(boundary, scored, alternatives)
         order = np.lexsort((rank, cuts.parcel[chosen]))
         for row, cut in as_cuts(boundary, scored, chosen[order]):
             out[rows[row]].append(cut)
@@ -196,7 +202,7 @@ def as_cuts(boundary: Boundary, scored: ScoredCuts, chosen: IntArray) -> Iterato
         return
     count = np.array([len(path) for path in paths])
     xy = boundary.rings.to_map(np.repeat(parcel, count), np.concatenate(paths))
-    for row, e_a, s_a, e_b, s_b, path, quality in zip(
+    for row, e_a, s_a, e_b, s_b, path, quality, terms in zip(
         parcel.tolist(),
         np.minimum(edge_a, last).tolist(),
         along_a.tolist(),
@@ -204,6 +210,7 @@ def as_cuts(boundary: Boundary, scored: ScoredCuts, chosen: IntArray) -> Iterato
         along_b.tolist(),
         np.split(xy, np.cumsum(count)[:-1]),
         scored.quality[chosen].tolist(),
+        map(tuple, scored.terms[chosen].tolist()),
         strict=True,
     ):
-        yield row, Cut(e_a, s_a, e_b, s_b, path, quality)
+        yield row, Cut(e_a, s_a, e_b, s_b, path, quality, terms)

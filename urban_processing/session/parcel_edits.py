@@ -1,0 +1,197 @@
+"""Edits of parcels: another cut, a cut undone, a park, parcels made one (Chen 2024, section 6).
+
+Each takes a moment and gives the state after the edit, without the streets that it may need, and
+a sentence that says what was done. What cannot be done is an `EditError`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from urban_processing.errors import EditError
+from urban_processing.layout import NOT_FIXED, Layout, Stage
+from urban_processing.mesh.planar import FloatArray
+from urban_processing.pipelines.levels import State
+from urban_processing.pipelines.quotas import divided
+from urban_processing.session.candidates import candidates
+from urban_processing.session.cutting import cut_faces, path_across
+from urban_processing.session.halves import ahead, with_kept_cuts
+from urban_processing.session.joining import joined, streets_between
+from urban_processing.session.lineage import descendants, merged, parents
+from urban_processing.session.model import Candidate
+from urban_processing.session.moment import Moment
+from urban_processing.subdivision.insert import insert_cuts
+from urban_processing.subdivision.parcels import parcel_rings
+from urban_processing.subdivision.short_edges import remove_short_edges
+
+Edited = tuple[State, str]
+
+
+def cuts_of(moment: Moment, face: int) -> tuple[Candidate, ...]:
+    """Candidate cuts of a parcel; none where it is locked, too small, or around a lake."""
+    layout = moment.state.layout
+    barred = layout.face_locked[face] or layout.mesh.face_n_loops[face] > 1
+    too_small = layout.mesh.face_area[face] < 2.0 * moment.state.floor
+    return () if barred or too_small else candidates(moment.state, face)
+
+
+def choose(moment: Moment, face: int, rank: int) -> Edited:
+    """Cut a parcel by one of its candidates."""
+    state, number = moment.state, moment.number(face)
+    _check_cuttable(moment, face)
+    found = cuts_of(moment, face)
+    if not 1 <= rank <= len(found):
+        raise EditError(_no_candidate(moment, face, rank, len(found)))
+    chosen = found[rank - 1]
+    cut, done, parent = insert_cuts(
+        state.layout,
+        parcel_rings(state.layout, np.array([face])),
+        [[chosen.cut]],
+        min_area=state.floor,
+        tee_snap=chosen.tee_snap,
+    )
+    if not done[0]:
+        raise EditError(f"Candidate {rank} of parcel {number} leaves no two legal halves.")
+    cut = remove_short_edges(with_kept_cuts(cut, parent), min_area=state.floor)
+    small, large = chosen.areas
+    sentence = f"Parcel {number} was cut into halves of {small:,.0f} and {large:,.0f} m²"
+    quota = divided(state.layout.face_quota, parent, cut.mesh.face_area)
+    after = dataclasses.replace(state, layout=cut.replace(face_quota=quota))
+    return ahead(state, after), sentence
+
+
+def draw_cut(moment: Moment, face: int, line: FloatArray, *, snap: float) -> Edited:
+    """Cut a parcel along a line that somebody drew."""
+    _check_cuttable(moment, face)
+    path = path_across(moment, face, line, snap=snap)
+    after = ahead(moment.state, cut_faces(moment, {face: path}))
+    return after, f"Parcel {moment.number(face)} was cut along a line"
+
+
+def undo_cut(moment: Moment, face: int) -> Edited:
+    """Make the halves of the cut that a parcel came of one again, and all that became of them."""
+    state, layout, number = moment.state, moment.state.layout, moment.number(face)
+    parent = parents(layout.face_lineage, moment.known)
+    lineage = int(layout.face_lineage[face])
+    if lineage not in parent:
+        raise EditError(f"Parcel {number} did not come of a cut: there is none to undo.")
+    faces = descendants(layout.face_lineage, parent[lineage], parent)
+    locked = [f for f in faces if layout.face_locked[f]]
+    if locked:
+        named = moment.number(locked[0])
+        raise EditError(f"Parcel {named} came of the same cut and is locked: unlock it first.")
+    _check_no_given_street(moment, faces)
+    one, kept = joined(moment, faces)
+    quota = int(layout.face_quota[faces].sum())
+    after = _with_face(
+        one,
+        kept,
+        face_lineage=parent[lineage],
+        face_level=int(layout.face_level[face]) - 1,
+        face_stage=Stage.OPEN if layout.face_stage[face] == Stage.AHEAD else Stage.BEHIND,
+        face_quota=quota,
+    )
+    halves = f"{len(faces)} parcels are" if len(faces) > 2 else "its halves are"
+    sentence = f"The cut that parcel {number} came of was undone: {halves} one again"
+    return dataclasses.replace(state, layout=after), sentence
+
+
+def lock(moment: Moment, face: int, land_use: str) -> Edited:
+    """Keep a parcel as it is, for a use such as a park."""
+    use = land_use.strip()
+    if not use:
+        raise EditError("A locked parcel needs a land use, such as park.")
+    state, layout = moment.state, moment.state.layout
+    uses = layout.land_uses if use in layout.land_uses else (*layout.land_uses, use)
+    if layout.face_locked[face] and layout.face_use[face] == uses.index(use):
+        raise EditError(f"Parcel {moment.number(face)} is locked as {use} already.")
+    after = _with_face(
+        layout.replace(land_uses=uses), face, face_locked=True, face_use=uses.index(use)
+    )
+    sentence = f"Parcel {moment.number(face)} is kept as {use}"
+    return dataclasses.replace(state, layout=after), sentence
+
+
+def unlock(moment: Moment, face: int) -> Edited:
+    """Let a locked parcel be a parcel like any other."""
+    state, layout = moment.state, moment.state.layout
+    if not layout.face_locked[face]:
+        raise EditError(f"Parcel {moment.number(face)} is not locked.")
+    after = _with_face(layout, face, face_locked=False, face_use=0)
+    sentence = f"Parcel {moment.number(face)} may be cut again"
+    return dataclasses.replace(state, layout=after), sentence
+
+
+def merge(moment: Moment, faces: Sequence[int], land_use: str | None) -> Edited:
+    """Make neighbours one parcel, which stays as it is until it is unlocked."""
+    state, layout = moment.state, moment.state.layout
+    if len(set(faces)) < 2:
+        raise EditError("Give at least two parcels to be merged.")
+    faces = sorted(set(faces))
+    streets = streets_between(layout, faces)
+    if len(streets):
+        a, b = (moment.number(int(f)) for f in layout.mesh.face.reshape(-1, 2)[streets[0]])
+        raise EditError(f"A street runs between parcels {a} and {b}: remove it first.")
+    one, kept = joined(moment, faces)
+    after = _with_face(
+        one,
+        kept,
+        face_lineage=merged(layout.face_lineage[faces]),
+        face_level=int(layout.face_level[faces].min()),
+        face_quota=int(layout.face_quota[faces].sum()),
+        face_stage=int(layout.face_stage[faces].max()),
+        face_locked=True,
+        face_use=0,
+    )
+    numbers = " and ".join(str(moment.number(f)) for f in faces)
+    sentence = f"Parcels {numbers} are one now, and are not cut unless they are unlocked"
+    if land_use is not None:
+        uses = after.land_uses
+        uses = uses if land_use in uses else (*uses, land_use)
+        after = _with_face(after.replace(land_uses=uses), kept, face_use=uses.index(land_use))
+        sentence = f"Parcels {numbers} are one now, kept as {land_use}"
+    return dataclasses.replace(state, layout=after), sentence
+
+
+def _with_face(layout: Layout, face: int, **values: int | bool) -> Layout:
+    """The layout with some values of one face changed."""
+    changed = {}
+    for name, value in values.items():
+        column = getattr(layout, name).copy()
+        column[face] = value
+        changed[name] = column
+    return layout.replace(**changed)
+
+
+def _check_cuttable(moment: Moment, face: int) -> None:
+    layout, number = moment.state.layout, moment.number(face)
+    if layout.face_locked[face]:
+        use = layout.land_uses[layout.face_use[face]]
+        raise EditError(f"Parcel {number} is locked ({use}): unlock it first.")
+    if layout.mesh.face_n_loops[face] > 1:
+        raise EditError(f"Parcel {number} lies around a lake: it cannot be cut by hand.")
+
+
+def _no_candidate(moment: Moment, face: int, rank: int, count: int) -> str:
+    number, area = moment.number(face), moment.state.layout.mesh.face_area[face]
+    if count:
+        return f"Parcel {number} has {count} candidates, counted from 1; there is no {rank}."
+    return (
+        f"Parcel {number} ({area:,.0f} m²) cannot be cut: no cut leaves two halves of at least "
+        f"{moment.state.floor:,.0f} m²."
+    )
+
+
+def _check_no_given_street(moment: Moment, faces: Sequence[int]) -> None:
+    layout = moment.state.layout
+    streets = streets_between(layout, faces)
+    given = streets[layout.edge_fixed[streets] != NOT_FIXED]
+    if len(given):
+        a, b = (moment.number(int(f)) for f in layout.mesh.face.reshape(-1, 2)[given[0]])
+        raise EditError(
+            f"A street that was given runs between parcels {a} and {b}, which would be one: "
+            "remove it first."
+        )

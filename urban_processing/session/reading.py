@@ -1,0 +1,96 @@
+"""Values of edits as people and files give them, checked and brought into one form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from urban_processing.errors import EditError
+
+Place = tuple[float, float]
+
+
+def whole(value: Any) -> int:
+    """A whole number."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise EditError(f"must be a whole number; it is {value!r}.")
+    return int(value)
+
+
+def number_or_none(value: Any) -> float | None:
+    """A number of metres, not negative, or nothing."""
+    if value is None:
+        return None
+    known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not known or not math.isfinite(value) or value < 0:
+        raise EditError(f"must be a number of metres, 0 or more; it is {value!r}.")
+    return float(value)
+
+
+def text(value: Any) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise EditError(f"must be a text; it is {value!r}.")
+    return value
+
+
+def text_or_none(value: Any) -> str | None:
+    """A text that says something, or nothing."""
+    if value is None:
+        return None
+    if not text(value).strip():
+        raise EditError("must say something; it is empty.")
+    return text(value).strip()
+
+
+def flag(value: Any) -> bool:
+    """True or false."""
+    if not isinstance(value, bool | np.bool_):
+        raise EditError(f"must be true or false; it is {value!r}.")
+    return bool(value)
+
+
+def place(value: Any) -> Place:
+    """Two coordinates."""
+    xy = _coordinates(value)
+    if xy.shape != (2,):
+        raise EditError(f"must be two coordinates, x and y; it is {value!r}.")
+    return float(xy[0]), float(xy[1])
+
+
+def points(value: Any) -> tuple[Place, ...]:
+    """A line: two points or more, or a geometry that has them."""
+    xy = _coordinates(value)
+    if xy.ndim != 2 or xy.shape[1] != 2 or len(xy) < 2:
+        raise EditError("must be a line of at least two points, each with x and y.")
+    return tuple((float(x), float(y)) for x, y in xy)
+
+
+def parcel(value: Any) -> int | Place:
+    """The number of a parcel, or a place in it."""
+    if isinstance(value, bool | str) or value is None:
+        raise EditError(f"must be the number of a parcel or a place in it; it is {value!r}.")
+    return whole(value) if isinstance(value, int | np.integer) else place(value)
+
+
+def parcels(value: Any) -> tuple[int | Place, ...]:
+    """Several parcels."""
+    if isinstance(value, str) or not isinstance(value, Sequence | np.ndarray):
+        raise EditError(f"must be a list of parcels; it is {value!r}.")
+    return tuple(parcel(each) for each in value)
+
+
+def _coordinates(value: Any) -> np.ndarray:
+    coords = getattr(value, "coords", value)
+    try:
+        xy = np.asarray(list(coords), dtype=np.float64)
+    except (TypeError, ValueError):
+        xy = np.full(1, math.nan)
+    if not np.isfinite(xy).all():
+        raise EditError("must be finite coordinates.")
+    # a point is one pair, also as a geometry; heights are left out
+    xy = xy[0] if hasattr(value, "coords") and len(xy) == 1 else xy
+    return xy[..., :2] if xy.ndim and xy.shape[-1] == 3 and hasattr(value, "coords") else xy

@@ -1,0 +1,429 @@
+"""`Session`: a layout that is steered level by level (Chen 2024, section 6, local control)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import numpy.typing as npt
+
+from urban_processing.errors import EditError, UrbanError
+from urban_processing.layout import Layout
+from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.pipelines.levels import (
+    ALGORITHM,
+    State,
+    begin,
+    progress_of,
+    state_of,
+    with_streets,
+)
+from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
+from urban_processing.session import files
+from urban_processing.session.edits import Edit, make_edit
+from urban_processing.session.figures import figures
+from urban_processing.session.model import Branch, Candidate, Change
+from urban_processing.session.moment import Moment, first_moment, next_moment
+from urban_processing.session.parcel_edits import cuts_of
+from urban_processing.session.places import face_of, local
+from urban_processing.session.reading import parcel as read_parcel
+from urban_processing.session.reading import place as read_place
+from urban_processing.session.requirements import check
+from urban_processing.session.streets_laid import streets_laid
+from urban_processing.session.timeline import Timeline
+from urban_processing.site import Site
+from urban_processing.version import __version__
+
+STEER = "steer"
+"""Name of what a session did, in provenance."""
+
+Place = tuple[float, float]
+
+
+class Session:
+    """A layout in the making: look at each level, change what is not liked, let it go on.
+
+    Parcels have numbers that they keep until they are cut or merged; wherever a parcel is asked
+    for, a place (x, y) in it does as well. Coordinates are map coordinates. Every edit is checked
+    against the design requirements of Chen 2024, section 3: where a parcel would lose its
+    street, the network fall apart or a parcel be too small, it raises an `EditError` that says
+    so, and nothing has changed. What an edit needs in streets is laid at once.
+
+    A session is begun with `begin`, `of_layout` or `load`.
+
+    References
+    ----------
+    Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban modeling.
+    Section 6, Fig. 15.
+    """
+
+    def __init__(self, state: State, start: files.Start) -> None:
+        self._start = start
+        self._timeline = Timeline.beginning(first_moment(state), start.sentence)
+        self._candidates: tuple[Moment, dict[int, tuple[Candidate, ...]]] | None = None
+
+    @classmethod
+    def begin(cls, site: Site, params: CogenerateParams) -> Self:
+        """Begin with land: one parcel for each of its parts, before the first level.
+
+        Raises
+        ------
+        InfeasibleError
+            If the parameters do not go together on this land.
+        """
+        params = dataclasses.replace(params, stop_at_level=None)
+        state = begin(site, params)
+        entry = Step(
+            algorithm=ALGORITHM,
+            parameters=params.as_dict(),
+            seed=params.seed,
+            version=__version__,
+            input_sha256=site.input_sha256,
+            seconds=0.0,
+            results=progress_of(state),
+        )
+        layout = state.layout.replace(history=(*state.layout.history, entry))
+        state = dataclasses.replace(state, layout=layout)
+        return cls(state, files.start_with_land(site, params))
+
+    @classmethod
+    def of_layout(cls, layout: Layout) -> Self:
+        """Go on with a layout that co-generation made, stopped at a level or finished.
+
+        Raises
+        ------
+        BoundaryError
+            If co-generation did not make it.
+        """
+        state = state_of(layout)
+        return cls(state, files.start_with_layout(layout, state.params))
+
+    # what there is now
+
+    @property
+    def _moment(self) -> Moment:
+        return self._timeline.moment(self._timeline.now, self._after)
+
+    @property
+    def layout(self) -> Layout:
+        """Parcels and streets as they are now, with what was done in its provenance."""
+        state = self._moment.state
+        if not self.edits:
+            return state.layout
+        entry = Step(
+            algorithm=STEER,
+            parameters={"edits": [edit.as_dict() for edit in self.edits]},
+            seed=state.params.seed,
+            version=__version__,
+            input_sha256=self._start.sha256,
+            seconds=0.0,
+            results=progress_of(state),
+        )
+        return state.layout.replace(history=(*state.layout.history, entry))
+
+    @property
+    def params(self) -> CogenerateParams:
+        """The parameters that the levels are laid out with."""
+        return self._moment.state.params
+
+    @property
+    def level(self) -> int:
+        """Number of levels so far."""
+        return self._moment.state.level
+
+    @property
+    def finished(self) -> bool:
+        """Whether no level is to come."""
+        return self._moment.state.finished
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the layout is finished: cleaned up and optimized, with nothing left to cut."""
+        return self._moment.state.completed and self.finished
+
+    @property
+    def parcels(self) -> tuple[int, ...]:
+        """Number of each parcel, in the order of the layout's faces."""
+        return self._moment.parcels
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """What was done, from the beginning to now."""
+        entries = (self._timeline.entries[number].edit for number in self._timeline.path())
+        return tuple(edit for edit in entries if edit is not None)
+
+    @property
+    def sentence(self) -> str:
+        """What was done last."""
+        return self._timeline.entries[self._timeline.now].sentence
+
+    def figures(self) -> dict[str, float]:
+        """Figures of the layout as it is now, by name: see `urban_processing.session.figures`."""
+        return figures(self._moment.state)
+
+    def parcel_at(self, place: Place) -> int | None:
+        """Number of the parcel at a place; None where there is none."""
+        moment = self._moment
+        face = moment.face_at(local(moment, (read_place(place),))[0])
+        return None if face is None else moment.number(face)
+
+    def candidates(self, parcel: int | Place) -> tuple[Candidate, ...]:
+        """Ways of cutting a parcel, the best first; none where it cannot be cut.
+
+        The first one is what the next level does, but for ends that it moves to where a
+        neighbour's cut of the same level ends.
+        """
+        moment = self._moment
+        if self._candidates is None or self._candidates[0] is not moment:
+            self._candidates = moment, {}
+        known = self._candidates[1]
+        face = face_of(moment, read_parcel(parcel))
+        if face not in known:
+            known[face] = cuts_of(moment, face)
+        return known[face]
+
+    # edits
+
+    def step(self, progress: Progress = SILENT) -> Change:
+        """Lay out the next level."""
+        return self.do("step", progress=progress)
+
+    def finish(self, progress: Progress = SILENT) -> Change:
+        """Lay out all the levels that are still to come, clean up the streets and optimize."""
+        return self.do("finish", progress=progress)
+
+    def choose(self, parcel: int | Place, candidate: int) -> Change:
+        """Cut a parcel by one of its candidates, given by its rank.
+
+        The next level leaves the halves alone: this was their cut.
+        """
+        return self.do("choose", parcel=parcel, candidate=candidate)
+
+    def cut(self, parcel: int | Place, line: npt.ArrayLike, *, snap: float | None = None) -> Change:
+        """Cut a parcel along a drawn line, (n, 2), that enters and leaves it once.
+
+        Ends that lie within `snap` metres of a corner are moved there.
+        """
+        return self.do("cut", parcel=parcel, line=line, snap=snap)
+
+    def undo_cut(self, parcel: int | Place) -> Change:
+        """Undo the cut that a parcel came of; the next level cuts what is one again anew."""
+        return self.do("undo_cut", parcel=parcel)
+
+    def lock(self, parcel: int | Place, land_use: str | None = None) -> Change:
+        """Keep a parcel as it is for a land use, by default as a park."""
+        return self.do("lock", parcel=parcel, land_use=land_use)
+
+    def unlock(self, parcel: int | Place) -> Change:
+        """Let a locked parcel be one like any other."""
+        return self.do("unlock", parcel=parcel)
+
+    def merge(self, parcels: Sequence[int | Place], land_use: str | None = None) -> Change:
+        """Make neighbours one parcel, which is locked, for a land use if one is given."""
+        return self.do("merge", parcels=parcels, land_use=land_use)
+
+    def add_street(
+        self,
+        line: npt.ArrayLike,
+        *,
+        follow: bool = False,
+        street_class: str = "",
+        width: float | None = None,
+        snap: float | None = None,
+    ) -> Change:
+        """Lay a street that stays where it is.
+
+        Parameters
+        ----------
+        line
+            (n, 2) points that it is drawn through, cutting the parcels that it crosses; with
+            `follow`, points that it goes through along the boundaries of parcels.
+        street_class, width
+            Kept as they are given; the width of its right-of-way is in metres.
+        snap
+            Metres within which a drawn line runs on a boundary, or a point is on one.
+        """
+        return self.do(
+            "add_street",
+            line=line,
+            follow=follow,
+            street_class=street_class,
+            width=width,
+            snap=snap,
+        )
+
+    def remove_street(self, place: Place, *, reach: float | None = None) -> Change:
+        """Take away the street at a place, from junction to junction; none is laid there again.
+
+        Parcels that need another street get one.
+        """
+        return self.do("remove_street", place=place, reach=reach)
+
+    def do(self, name: str, progress: Progress = SILENT, **values: Any) -> Change:
+        """Do an edit by its name in files; values that are None are left out.
+
+        Raises
+        ------
+        EditError
+            If it cannot be done, or would break the requirements; nothing has changed then.
+        """
+        given = {key: value for key, value in values.items() if value is not None}
+        return self._do(make_edit(name, given), progress)
+
+    def _do(self, edit: Edit, progress: Progress = SILENT) -> Change:
+        before = self._moment
+        after, sentence = _applied(before, edit, progress)
+        self._timeline.add(edit, after, sentence)
+        return _change(before, after, sentence)
+
+    @staticmethod
+    def _after(moment: Moment, edit: Edit) -> Moment:
+        return _applied(moment, edit, SILENT)[0]
+
+    # back and forth
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether something was done."""
+        return self._timeline.now > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether something was undone here."""
+        return self._timeline.now in self._timeline.ahead
+
+    def undo(self) -> Change:
+        """Go back to before the last edit; where there is none, nothing happens."""
+        entry = self._timeline.entries[self._timeline.now]
+        return self._go_to(max(entry.before, 0), f"Undone: {_in_clause(entry.sentence)}")
+
+    def redo(self) -> Change:
+        """Do again what was undone last; where that is nothing, nothing happens."""
+        number = self._timeline.ahead.get(self._timeline.now, self._timeline.now)
+        return self._go_to(number, self._timeline.entries[number].sentence)
+
+    def branches(self) -> tuple[Branch, ...]:
+        """The ends of all that was done, also of what was undone and gone on from otherwise."""
+        timeline = self._timeline
+        path = timeline.path()
+        return tuple(
+            Branch(
+                number=tip,
+                sentence=timeline.entries[tip].sentence,
+                edits=len(timeline.path(tip)) - 1,
+                current=timeline.now in timeline.path(tip) and _follows(timeline, path, tip),
+            )
+            for tip in timeline.tips()
+        )
+
+    def go_to(self, branch: int) -> Change:
+        """Go to the end of a branch, by its number."""
+        numbers = [each.number for each in self.branches()]
+        if branch not in numbers:
+            listed = ", ".join(map(str, numbers))
+            raise EditError(f"There is no branch {branch}; there are {listed}.")
+        return self._go_to(branch, self._timeline.entries[branch].sentence)
+
+    def _go_to(self, number: int, sentence: str) -> Change:
+        before = self._moment
+        self._timeline.go_to(number)
+        return _change(before, self._moment, sentence)
+
+    # files
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
+        """Save what was done as a small JSON file, which `load` replays.
+
+        Raises
+        ------
+        OutputError
+            If the file is there already, or cannot be written.
+        """
+        done = [
+            (entry.edit, entry.before) for entry in self._timeline.entries if entry.edit is not None
+        ]
+        saved = files.as_json(self._start, done, current=self._timeline.now, layout=self.layout)
+        return files.save(path, saved, overwrite=overwrite)
+
+    @classmethod
+    def load(
+        cls, path: str | PathLike[str], start: Site | Layout, progress: Progress = SILENT
+    ) -> Self:
+        """Replay a saved session on the land or the layout that it began with.
+
+        Raises
+        ------
+        EditError
+            If the file is no saved session, is of another version, was begun with something
+            else, or holds an edit that cannot be done.
+        """
+        saved = files.read(path)
+        if isinstance(start, Site):
+            session = cls.begin(start, saved.params())
+        else:
+            session = cls.of_layout(start)
+        saved.check_start(session._start)
+        session.replay(saved, progress)
+        return session
+
+    def replay(self, saved: files.Saved, progress: Progress = SILENT) -> None:
+        """Do the edits of a file, one after the other, branches included.
+
+        Raises
+        ------
+        EditError
+            Where one cannot be done; nothing has changed then.
+        """
+        untouched = self._timeline
+        self._timeline = untouched.copy()
+        try:
+            self._replay(saved, progress)
+            saved.check_result(self.layout)
+        except UrbanError:
+            self._timeline = untouched
+            raise
+
+    def _replay(self, saved: files.Saved, progress: Progress) -> None:
+        count = len(saved.edits)
+        numbers = [self._timeline.now]
+        for i, (edit, after) in enumerate(zip(saved.edits, saved.after, strict=True)):
+            self._timeline.now = numbers[after]
+            try:
+                self._do(edit, progress.slice(i / count, (i + 1) / count))
+            except EditError as error:
+                where = f"{saved.path}, edit {i + 1} ({edit.name})"
+                raise EditError(f"{where}: {problem}" for problem in error.problems) from error
+            numbers.append(self._timeline.now)
+        self._timeline.go_to(numbers[saved.current])
+
+
+def _applied(before: Moment, edit: Edit, progress: Progress) -> tuple[Moment, str]:
+    """The moment after an edit with the streets it needs, and what was done."""
+    state, sentence = edit.apply(before, progress)
+    if not edit.grows_streets:
+        return next_moment(before, state), f"{sentence}."
+    grown = with_streets(state)
+    after = next_moment(before, grown)
+    check(before, after)
+    return after, f"{sentence}{streets_laid(state.layout, grown.layout)}."
+
+
+def _change(before: Moment, after: Moment, sentence: str) -> Change:
+    old, new = set(before.parcels), set(after.parcels)
+    return Change(sentence, gone=tuple(sorted(old - new)), new=tuple(sorted(new - old)))
+
+
+def _in_clause(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:]
+
+
+def _follows(timeline: Timeline, path: list[int], tip: int) -> bool:
+    """Whether redo leads from the end of a path to a tip."""
+    at = path[-1]
+    while at in timeline.ahead and at != tip:
+        at = timeline.ahead[at]
+    return at == tip

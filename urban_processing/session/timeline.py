@@ -1,0 +1,100 @@
+"""The moments of a session: a tree, since what was undone stays as a branch."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from urban_processing.session.edits import Edit, Finish, TakeStep
+from urban_processing.session.moment import Moment
+
+KEPT = 64
+"""Number of latest moments that are kept; others are made again when they are asked for."""
+
+
+@dataclass
+class Entry:
+    """One edit and the moment after it.
+
+    Parameters
+    ----------
+    edit
+        What was done; None at the beginning.
+    before
+        Number of the entry before; -1 at the beginning.
+    sentence
+        What was done, in words.
+    moment
+        The moment after it, where it is kept.
+    """
+
+    edit: Edit | None
+    before: int
+    sentence: str
+    moment: Moment | None
+
+
+@dataclass
+class Timeline:
+    """Entries by number, the one that is now, and which one redo leads to from each."""
+
+    entries: list[Entry]
+    now: int = 0
+    ahead: dict[int, int] = field(default_factory=dict)
+
+    @classmethod
+    def beginning(cls, moment: Moment, sentence: str) -> Timeline:
+        """A timeline with nothing done yet."""
+        return cls([Entry(None, -1, sentence, moment)])
+
+    def copy(self) -> Timeline:
+        """Return a timeline with the same entries that goes on by itself."""
+        return Timeline(list(map(copy.copy, self.entries)), self.now, dict(self.ahead))
+
+    def add(self, edit: Edit, moment: Moment, sentence: str) -> None:
+        """Go on from now with an edit."""
+        self.entries.append(Entry(edit, self.now, sentence, moment))
+        self.ahead[self.now] = len(self.entries) - 1
+        self.now = len(self.entries) - 1
+        self._forget()
+
+    def path(self, number: int | None = None) -> list[int]:
+        """Numbers of the entries from the beginning to one of them, by default to now."""
+        at = self.now if number is None else number
+        line = []
+        while at >= 0:
+            line.append(at)
+            at = self.entries[at].before
+        return line[::-1]
+
+    def tips(self) -> list[int]:
+        """Numbers of the entries after which nothing was done: the end of each branch."""
+        followed = {entry.before for entry in self.entries}
+        return [number for number in range(len(self.entries)) if number not in followed]
+
+    def go_to(self, number: int) -> None:
+        """Make another entry the one that is now; redo leads along the way to it."""
+        line = self.path(number)
+        self.ahead.update(pairwise(line))
+        self.now = number
+
+    def moment(self, number: int, apply: Callable[[Moment, Edit], Moment]) -> Moment:
+        """The moment after an entry, made again from the nearest one that is kept."""
+        missing = []
+        at = number
+        while (moment := self.entries[at].moment) is None:
+            missing.append(at)
+            at = self.entries[at].before
+        for later in reversed(missing):
+            edit = self.entries[later].edit
+            if edit is not None:
+                moment = self.entries[later].moment = apply(moment, edit)
+        return moment
+
+    def _forget(self) -> None:
+        """Drop moments of long ago, but for the beginning and the ends of levels."""
+        old = len(self.entries) - 1 - KEPT
+        if old > 0 and not isinstance(self.entries[old].edit, TakeStep | Finish):
+            self.entries[old].moment = None
