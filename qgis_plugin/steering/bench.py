@@ -53,7 +53,7 @@ class Bench:
             can_redo=session.can_redo,
             figures=session.figures(),
             branches=tuple(
-                BranchName(b.number, b.sentence, b.level, b.current) for b in session.branches()
+                BranchName(b.number, b.sentence, b.current) for b in session.branches()
             ),
             difference=difference(before, self.seen, whole=whole),
             crs=session.layout.frame.crs,

@@ -64,7 +64,6 @@ class BranchName:
 
     number: int
     sentence: str
-    level: int
     current: bool
 
 
