@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import shapely
 from qgis.core import QgsProcessingContext, QgsProcessingFeedback
-from urban_processing.session.session import Session
 
 from qgis_plugin.geopackage import OGR
 from qgis_plugin.sources import Sources
@@ -30,6 +29,7 @@ from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.progress import Progress
+from urban_processing.session.session import Session
 from urban_processing.site import Site
 
 
@@ -52,9 +52,7 @@ class Bench:
             can_undo=session.can_undo,
             can_redo=session.can_redo,
             figures=session.figures(),
-            branches=tuple(
-                BranchName(b.number, b.sentence, b.current) for b in session.branches()
-            ),
+            branches=tuple(BranchName(b.number, b.sentence, b.current) for b in session.branches()),
             difference=difference(before, self.seen, whole=whole),
             crs=session.layout.frame.crs,
             parcels=len(self.seen.parcels),

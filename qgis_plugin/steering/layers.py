@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
+from math import inf
 from typing import Any
 
 from qgis.core import (
@@ -169,15 +170,35 @@ class _ShownLayer:
 
     def nearest(self, place: QgsPointXY, reach: float) -> QgsGeometry | None:
         """Return the geometry that is nearest to a place, no farther than `reach`."""
-        if self.layer is None:
-            return None
-        around = QgsRectangle.fromCenterAndSize(place, 2 * reach, 2 * reach)
-        request = QgsFeatureRequest().setFilterRect(around).setNoAttributes()
         here = QgsGeometry.fromPointXY(place)
-        found = [feature.geometry() for feature in self.layer.getFeatures(request)]
+        found = self._around(place, reach)
         near = [(shape.distance(here), i) for i, shape in enumerate(found)]
         best = min(near, default=(reach, -1))
         return found[best[1]] if best[1] >= 0 and best[0] <= reach else None
+
+    def snapped(self, place: QgsPointXY, reach: float) -> QgsPointXY | None:
+        """Return the corner that is nearest to a place, else the nearest place of a boundary.
+
+        None where neither lies within `reach`.
+        """
+        corners, sides = [], []
+        for shape in self._around(place, reach):
+            corner, *_, squared = shape.closestVertex(place)
+            corners.append((squared, corner.x(), corner.y()))
+            squared, side, *_ = shape.closestSegmentWithContext(place)
+            sides.append((squared, side.x(), side.y()))
+        for found in (corners, sides):
+            squared, x, y = min(found, default=(inf, 0.0, 0.0))
+            if squared <= reach**2:
+                return QgsPointXY(x, y)
+        return None
+
+    def _around(self, place: QgsPointXY, reach: float) -> list[QgsGeometry]:
+        if self.layer is None:
+            return []
+        around = QgsRectangle.fromCenterAndSize(place, 2 * reach, 2 * reach)
+        request = QgsFeatureRequest().setFilterRect(around).setNoAttributes()
+        return [feature.geometry() for feature in self.layer.getFeatures(request)]
 
     def _touch(self) -> None:
         self._touched = True

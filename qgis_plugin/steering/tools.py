@@ -13,7 +13,7 @@ from qgis.core import (
     QgsProject,
     QgsWkbTypes,
 )
-from qgis.gui import QgsMapCanvas, QgsMapMouseEvent, QgsMapTool, QgsRubberBand
+from qgis.gui import QgsMapCanvas, QgsMapMouseEvent, QgsMapTool, QgsRubberBand, QgsVertexMarker
 from qgis.PyQt.QtCore import Qt, QTimer
 from qgis.PyQt.QtGui import QColor, QKeyEvent
 
@@ -119,9 +119,10 @@ class SteeringTool(QgsMapTool):
 
     def place(self, point: QgsPointXY) -> Place | None:
         """Return the session's coordinates of a place of the map; None where there are none."""
-        way = QgsCoordinateTransform.TransformDirection.ReverseTransform
+        crs = self.map.mapSettings().destinationCrs()
+        way = QgsCoordinateTransform(crs, self.steering.crs, QgsProject.instance())
         try:
-            at = self.to_map().transform(point, way)
+            at = way.transform(point)
         except QgsCsException:
             return None
         return (at.x(), at.y())
@@ -359,19 +360,28 @@ class DrawTool(SteeringTool):
         self.line = QgsRubberBand(canvas, QgsWkbTypes.GeometryType.LineGeometry)
         self.line.setColor(_DRAWN)
         self.line.setWidth(3)
+        self.mark = QgsVertexMarker(canvas)
+        self.mark.setIconType(QgsVertexMarker.IconType.ICON_BOX)
+        self.mark.setColor(_DRAWN)
+        self.mark.setIconSize(12)
+        self.mark.setPenWidth(2)
+        self.mark.setVisible(False)
 
     def canvasReleaseEvent(self, event: QgsMapMouseEvent) -> None:
         """Set a point; end with the right button."""
         if event.button() == Qt.MouseButton.RightButton:
             self.finish()
         elif event.button() == Qt.MouseButton.LeftButton:
-            self.points.append(event.snapPoint())
+            self.points.append(self._snapped(event))
             self._draw()
 
     def canvasMoveEvent(self, event: QgsMapMouseEvent) -> None:
         """Draw on to the cursor."""
+        at = self._snapped(event)
         if self.points:
-            self._draw(event.snapPoint())
+            self._draw(at)
+        self.mark.setCenter(at)
+        self.mark.setVisible(at != event.originalMapPoint())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """End with Enter, go back with Backspace."""
@@ -397,12 +407,25 @@ class DrawTool(SteeringTool):
         """Forget what was drawn."""
         self.points = []
         self._draw()
+        self.mark.setVisible(False)
         super().reset()
 
     def dispose(self) -> None:
         """Take away what the tool has on the map, for good."""
         super().dispose()
-        self.map.scene().removeItem(self.line)
+        for item in (self.line, self.mark):
+            self.map.scene().removeItem(item)
+
+    def _snapped(self, event: QgsMapMouseEvent) -> QgsPointXY:
+        """Where QGIS snaps to, or else the corner or boundary of a parcel next to the cursor."""
+        point = event.snapPoint()
+        if event.isSnapped():
+            return point
+        place = self.place(point)
+        if place is None:
+            return point
+        near = self.steering.layers.parcels.snapped(QgsPointXY(*place), self.reach(point))
+        return point if near is None else self.to_map().transform(near)
 
     def _draw(self, *further: QgsPointXY) -> None:
         self.line.reset(QgsWkbTypes.GeometryType.LineGeometry)

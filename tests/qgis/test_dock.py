@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,16 +13,15 @@ import pytest
 
 pytest.importorskip("qgis.core", reason="QGIS is not here")
 
-from in_qgis import shapes, square
+from in_qgis import square
 from qgis.core import (
     QgsCoordinateReferenceSystem,
-    QgsFeature,
-    QgsGeometry,
     QgsPointXY,
     QgsProject,
     QgsRectangle,
 )
-from qgis.PyQt.QtCore import QCoreApplication, QPoint, Qt
+from qgis.PyQt.QtCore import QCoreApplication, QEvent, QPoint, QPointF, Qt
+from qgis.PyQt.QtGui import QMouseEvent
 from qgis.PyQt.QtTest import QTest
 from qgis.PyQt.QtWidgets import QAbstractButton, QDockWidget, QMessageBox
 
@@ -87,7 +87,15 @@ class Table:
 
     def rest(self, x: float, y: float) -> Any:
         """Rest with the cursor on a place until the map shows what is there."""
-        QTest.mouseMove(self.canvas.viewport(), self.point(x, y))
+        return self.rest_on(self.point(x, y))
+
+    def rest_on(self, pixel: QPoint) -> Any:
+        """Rest with the cursor on a pixel; QTest moves the real cursor, which is not there."""
+        none = Qt.MouseButton.NoButton
+        move = QMouseEvent(
+            QEvent.Type.MouseMove, QPointF(pixel), none, none, Qt.KeyboardModifier.NoModifier
+        )
+        QCoreApplication.sendEvent(self.canvas.viewport(), move)
         QTest.qWait(130)
         self.wait()
         return self.canvas.mapTool().under
@@ -110,6 +118,16 @@ class Table:
         return [str(m) for m in self.iface.messageBar().messages]
 
 
+@pytest.fixture(autouse=True)
+def no_mistakes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What Qt calls may not raise; QGIS, too, would show it."""
+    raised: list[BaseException] = []
+    monkeypatch.setattr(sys, "excepthook", lambda kind, error, trace: raised.append(error))
+    yield
+    if raised:
+        raise raised[0]
+
+
 @pytest.fixture
 def plugin(provider: Any, qgis_iface: Any, qgis_new_project: None) -> Iterator[Any]:
     package = importlib.import_module("urban_processing_qgis")
@@ -128,6 +146,9 @@ def plugin(provider: Any, qgis_iface: Any, qgis_new_project: None) -> Iterator[A
 def table(plugin: Any, qgis_iface: Any) -> Table:
     canvas = qgis_iface.mapCanvas()
     canvas.resize(640, 640)
+    canvas.show()
+    QCoreApplication.processEvents()
+    assert canvas.viewport().width() > 600
     canvas.setDestinationCrs(QgsCoordinateReferenceSystem("EPSG:32630"))
     canvas.setExtent(QgsRectangle(X - 20, Y - 20, X + SIDE + 20, Y + SIDE + 20))
     plugin.show_dock(True)
@@ -166,3 +187,343 @@ def test_a_step_cuts_and_is_undone(begun: Table) -> None:
     again = begun.features
     assert set(again) == set(two)
     assert all(again[n].geometry().asWkb() == two[n].geometry().asWkb() for n in two)
+
+
+def test_the_whole_of_figure_15(begun: Table) -> None:
+    """Chen 2024, Fig. 15: streets, steps, another cut, a park, another street; then layers."""
+    begun.tool("add_street")
+    begun.draw((-2, 120), (303, 120))  # clicks next to a boundary are on it
+    begun.draw((180, 122), (180, 298))
+    assert len(begun.features) == 3, begun.panel.note.text()
+    begun.click(begun.panel.step)
+    assert begun.view.level == 1
+
+    begun.tool("choose")
+    under = begun.rest(60, 60)
+    assert under is not None
+    assert len(under.options) >= 2
+    assert begun.panel.candidates.rowCount() == len(under.options)
+    before = set(begun.features)
+    QTest.keyClick(begun.canvas, "2")
+    begun.wait()
+    assert under.parcel not in begun.features
+    assert len(set(begun.features) - before) == 2
+    begun.click(begun.panel.step)
+
+    begun.tool("undo_cut")
+    count = len(begun.features)
+    begun.on_map(60, 60)
+    assert len(begun.features) < count
+    begun.tool("lock")
+    begun.on_map(60, 60)
+    [park] = [f for f in begun.features.values() if f["land_use"] == "park"]
+    assert park["state"] == "locked"
+    assert park.geometry().contains(QgsPointXY(X + 60, Y + 60))
+
+    begun.click(begun.panel.step)
+    assert park["parcel"] in begun.features
+    begun.tool("add_street")
+    begun.draw((240, 2), (240, 119))
+    assert not begun.panel.note.text().startswith("There"), begun.panel.note.text()
+
+    begun.click(begun.panel.to_layers)
+    assert begun.view.complete
+    loaded = {made.name(): made for made in QgsProject.instance().mapLayers().values()}
+    parcels = loaded["Parcels"]
+    assert parcels.featureCount() == len(begun.features)
+    assert [f["land_use"] for f in parcels.getFeatures()].count("park") == 1
+    assert {f["fixed_id"] for f in loaded["Streets"].getFeatures()} >= {1, 2, 3}
+    node = QgsProject.instance().layerTreeRoot().findLayer(parcels.id())
+    assert node.parent().name() == "land"
+    assert parcels.renderer().type() == "RuleRenderer"
+
+
+def test_what_is_refused_changes_nothing_and_says_why(begun: Table) -> None:
+    begun.tool("lock")
+    begun.on_map(-10, -10)
+    assert "no parcel" in begun.panel.note.text()
+    assert begun.warnings
+    begun.tool("remove_street")
+    begun.on_map(150, 150)
+    begun.tool("undo_cut")
+    begun.on_map(150, 150)
+    begun.tool("cut")
+    begun.draw((2, 150), (5, 150))
+    assert len(begun.features) == 1
+    assert not begun.view.can_undo
+    assert not begun.steering.unsaved
+
+
+def test_a_drawn_cut_and_a_merge(begun: Table) -> None:
+    begun.tool("cut")
+    begun.draw((100, -5), (110, 150), (100, 305))
+    assert len(begun.features) == 2, begun.panel.note.text()
+    tool = begun.tool("merge")
+    begun.on_map(50, 150)
+    begun.on_map(200, 150)
+    assert len(tool.chosen) == 2
+    begun.on_map(200, 150)  # a second click takes it out
+    assert len(tool.chosen) == 1
+    begun.on_map(200, 150)
+    QTest.keyClick(begun.canvas, Qt.Key.Key_Return)
+    begun.wait()
+    assert len(begun.features) == 1, begun.panel.note.text()
+    assert not tool.chosen
+    [whole] = begun.features.values()
+    begun.tool("unlock")
+    begun.on_map(150, 150)
+    assert begun.features[whole["parcel"]]["state"] == "to cut"
+
+
+def test_escape_starts_over(begun: Table) -> None:
+    tool = begun.tool("cut")
+    begun.on_map(100, 5)
+    begun.on_map(100, 100)
+    QTest.keyClick(begun.canvas, Qt.Key.Key_Backspace)
+    assert len(tool.points) == 1
+    QTest.keyClick(begun.canvas, Qt.Key.Key_Escape)
+    assert not tool.points
+    begun.on_map(100, 100, Qt.MouseButton.RightButton)
+    assert len(begun.features) == 1
+
+
+def test_the_nearest_candidate_stands_out_and_a_click_chooses_it(begun: Table) -> None:
+    tool = begun.tool("choose")
+    under = begun.rest(150, 150)
+    last = under.options[-1]
+    line = tool.overlay.line_of(last.rank)
+    at = line.interpolate(0.3 * line.length()).asPoint()
+    begun.rest(at.x() - X, at.y() - Y)
+    assert tool.overlay.highlighted == last.rank
+    assert begun.panel.candidates.selectedIndexes()[0].row() == last.rank - 1
+    begun.on_map(at.x() - X, at.y() - Y)
+    areas = sorted(f.geometry().area() for f in begun.features.values())
+    assert areas == pytest.approx(sorted(last.areas), rel=1e-6)
+    assert tool.overlay.ranks == ()
+
+
+def test_the_newest_question_wins(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    begun.tool("choose")
+    answers: list[Any] = []
+    begun.steering.hovered.connect(answers.append)
+    for x in (20, 60, 100, 140, 180, 220, 280):
+        begun.steering.hover((X + x, Y + 150.0), with_options=True)
+    begun.wait()
+    shown = [answer.parcel for answer in answers]
+    right = next(n for n, f in begun.features.items() if f.geometry().contains(_at(280, 150)))
+    assert shown[-1] == right
+    assert len(shown) < 7
+
+
+def test_branches_are_offered_and_gone_to(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    steps = set(begun.features)
+    assert begun.panel.branches.isHidden()
+    begun.click(begun.panel.undo)
+    begun.tool("cut")
+    begun.draw((100, -5), (100, 305))
+    assert not begun.panel.branches.isHidden()
+    assert begun.panel.branches.count() == 2
+    other = 1 - begun.panel.branches.currentIndex()
+    begun.panel.branches.activated.emit(other)
+    begun.wait()
+    assert set(begun.features) == steps
+
+
+def test_it_is_saved_and_opened_again(
+    begun: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun.click(begun.panel.step)
+    begun.tool("lock")
+    begun.on_map(60, 60)
+    was = {n: (f["land_use"], f.geometry().asWkb()) for n, f in begun.features.items()}
+    assert begun.steering.unsaved
+    path = tmp_path / "steered"
+    _answer_file(monkeypatch, begun, "getSaveFileName", path)
+    begun.click(begun.panel.save)
+    assert not begun.steering.unsaved
+    saved = tmp_path / "steered.json"
+    assert saved.is_file()
+    begun.click(begun.panel.end)
+    assert begun.view is None
+    assert not [m for m in QgsProject.instance().mapLayers().values() if "steering" in m.name()]
+    _answer_file(monkeypatch, begun, "getOpenFileName", saved)
+    begun.click(begun.dock.start_panel.open)
+    assert {n: (f["land_use"], f.geometry().asWkb()) for n, f in begun.features.items()} == was
+
+
+def test_a_session_of_other_land_is_not_opened(
+    begun: Table, layer: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun.click(begun.panel.step)
+    begun.steering.save(tmp_path / "one.json")
+    begun.wait()
+    begun.click(begun.panel.end)
+    other = layer([square(SIDE + 50, X, Y)], name="other")
+    QgsProject.instance().addMapLayer(other)
+    begun.dock.start_panel.land.setLayer(other)
+    _answer_file(monkeypatch, begun, "getOpenFileName", tmp_path / "one.json")
+    begun.click(begun.dock.start_panel.open)
+    assert begun.view is None
+    assert begun.dock.start_note.text()
+    assert begun.warnings
+
+
+def test_a_layout_file_is_written_and_gone_on_with(
+    begun: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun.click(begun.panel.step)
+    begun.click(begun.panel.step)
+    areas = sorted(round(f["area_m2"], 3) for f in begun.features.values())
+    _answer_file(monkeypatch, begun, "getSaveFileName", tmp_path / "level.gpkg")
+    begun.click(begun.panel.write)
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
+    begun.click(begun.panel.end)
+    start = begun.dock.start_panel
+    start.on_file.setChecked(True)
+    start.file.setFilePath(str(tmp_path / "level.gpkg"))
+    begun.click(start.begin)
+    assert begun.view.level == 2, begun.warnings
+    assert sorted(round(f["area_m2"], 3) for f in begun.features.values()) == areas
+    begun.click(begun.panel.step)
+    assert begun.view.level == 3
+
+
+def test_a_session_with_unsaved_edits_is_not_lost_by_a_slip(
+    begun: Table, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun.click(begun.panel.step)
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.No)
+    begun.click(begun.panel.end)
+    assert begun.view is not None
+
+
+def test_only_what_changed_is_changed_in_the_layers(begun: Table) -> None:
+    for _ in range(3):
+        begun.click(begun.panel.step)
+    before = {n: f.id() for n, f in begun.features.items()}
+    begun.tool("lock")
+    begun.on_map(60, 60)
+    after = {n: f.id() for n, f in begun.features.items()}
+    assert before.keys() == after.keys()
+    assert sum(before[n] != after[n] for n in before) == 1
+
+
+def test_the_map_may_have_another_crs(begun: Table) -> None:
+    begun.canvas.setDestinationCrs(QgsCoordinateReferenceSystem("EPSG:4326"))
+    layer = begun.steering.layers.parcels.layer
+    begun.canvas.setExtent(
+        begun.canvas.mapSettings().layerExtentToOutputExtent(layer, layer.extent())
+    )
+    tool = begun.tool("choose")
+    middle = begun.canvas.extent().center()
+    at = begun.canvas.getCoordinateTransform().transform(middle)
+    pixel = QPoint(round(at.x()), round(at.y()))
+    begun.rest_on(pixel)
+    assert tool.under is not None
+    assert begun.canvas.extent().contains(tool.overlay.line_of(1).boundingBox())
+    QTest.mouseClick(begun.canvas.viewport(), Qt.MouseButton.LeftButton, pos=pixel)
+    begun.wait()
+    assert len(begun.features) == 2
+
+
+def test_a_run_is_stopped(begun: Table) -> None:
+    begun.dock.start_panel.size.setValue(50)
+    stopped: list[bool] = []
+    begun.steering.progressed.connect(lambda *_: (begun.steering.cancel(), stopped.append(True)))
+    QTest.mouseClick(begun.panel.finish, Qt.MouseButton.LeftButton)
+    assert not begun.panel.step.isEnabled()
+    assert begun.panel.step.toolTip()
+    assert not begun.panel.cancel.isHidden()
+    begun.steering.cancel()
+    begun.wait()
+    assert "Stopped" in begun.panel.note.text()
+    assert not begun.view.can_undo
+    assert begun.panel.step.isEnabled()
+
+
+def test_layers_that_were_taken_away_come_back(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    QgsProject.instance().removeMapLayer(begun.steering.layers.parcels.layer.id())
+    begun.wait()
+    begun.click(begun.panel.step)
+    assert len(begun.features) == len(begun.features) == begun.view.parcels
+    QgsProject.instance().clear()
+    begun.wait()
+    begun.click(begun.panel.undo)
+    assert len(begun.features) == begun.view.parcels == 2
+
+
+def test_closing_the_dock_keeps_the_session(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    begun.tool("choose")
+    begun.dock.close()
+    assert begun.canvas.mapTool() not in begun.dock.tools.values()
+    begun.plugin.show_dock(True)
+    assert begun.view.level == 1
+    begun.click(begun.panel.step)
+    assert begun.view.level == 2
+
+
+def test_unloading_leaves_nothing(begun: Table, qgis_iface: Any) -> None:
+    window = qgis_iface.mainWindow()
+    items = len(begun.canvas.scene().items())
+    begun.tool("choose")
+    begun.rest(150, 150)
+    for _ in range(2):
+        begun.click(begun.panel.step)
+    QTest.mouseClick(begun.panel.finish, Qt.MouseButton.LeftButton)  # and it is still going on
+    worker = begun.steering.worker
+    begun.plugin.provider = None  # other tests go on with it
+    begun.plugin.unload()
+    for _ in range(5):
+        QCoreApplication.processEvents()
+    QCoreApplication.sendPostedEvents(None, 52)  # deferred deletes
+    assert not worker._thread.is_alive()
+    assert begun.plugin.dock is None
+    assert not [
+        d for d in window.findChildren(QDockWidget) if d.objectName() == "UrbanProcessingSteering"
+    ]
+    assert not [m for m in QgsProject.instance().mapLayers().values() if "steering" in m.name()]
+    assert QgsProject.instance().layerTreeRoot().findGroup("Steering") is None
+    assert len(begun.canvas.scene().items()) < items
+
+
+def test_disabled_buttons_say_why(table: Table) -> None:
+    start = table.dock.start_panel
+    assert not start.begin.isEnabled()
+    assert "layer" in start.begin.toolTip().lower()
+    start.on_file.setChecked(True)
+    assert "file" in start.begin.toolTip().lower()
+
+
+def test_selected_features_alone(table: Table, layer: Callable[..., Any]) -> None:
+    land = layer([square(100, X, Y), square(150, X + 200, Y)])
+    QgsProject.instance().addMapLayer(land)
+    start = table.dock.start_panel
+    assert not start.selected.isEnabled()
+    land.selectByIds([2])
+    assert start.selected.isEnabled()
+    start.selected.setChecked(True)
+    table.click(start.begin)
+    assert sum(f["area_m2"] for f in table.features.values()) == pytest.approx(150**2)
+
+
+def test_what_is_wrong_with_the_land_is_said(table: Table, layer: Callable[..., Any]) -> None:
+    QgsProject.instance().addMapLayer(layer([square(10, X, Y)], crs="EPSG:4326"))
+    table.click(table.dock.start_panel.begin)
+    assert table.view is None
+    assert table.dock.start_note.text()
+    assert table.dock.start_panel.begin.isEnabled()
+
+
+def _at(x: float, y: float) -> QgsPointXY:
+    return QgsPointXY(X + x, Y + y)
+
+
+def _answer_file(monkeypatch: pytest.MonkeyPatch, table: Table, ask: str, path: Path) -> None:
+    """Answer the dialogs of the plugin that ask for a file."""
+    from qgis.PyQt.QtWidgets import QFileDialog
+
+    monkeypatch.setattr(QFileDialog, ask, lambda *_: (str(path), ""))

@@ -12,7 +12,13 @@ from urban_processing.errors import EditError
 from urban_processing.layout import NOT_FIXED, EdgeKind, GivenStreet, Layout, Steering
 from urban_processing.mesh.planar import FloatArray, IntArray
 from urban_processing.pipelines.levels import State
-from urban_processing.session.cutting import Joint, check_large_enough, joined, thinned, with_vertices
+from urban_processing.session.cutting import (
+    Joint,
+    check_large_enough,
+    joined,
+    thinned,
+    with_vertices,
+)
 from urban_processing.session.drawn_line import DrawnLine, as_line, as_points
 from urban_processing.session.moment import Moment
 from urban_processing.session.street_lines import Link, Plan, barred_edges, plan_street
