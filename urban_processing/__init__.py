@@ -23,18 +23,22 @@ if TYPE_CHECKING:
         find_blocks,
         measure,
         optimize,
+        resume,
+        steer,
         subdivide,
         transfer,
     )
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.io.measured import GeoComparison, GeoFabric
+    from urban_processing.io.sessions import GeoSession
     from urban_processing.params.blocks import BlocksParams
     from urban_processing.params.calibrate import CalibrateParams
     from urban_processing.params.cogenerate import CogenerateParams, StreetPattern
     from urban_processing.params.compare import CompareParams
     from urban_processing.params.measure import MeasureParams
     from urban_processing.params.optimize import OptimizeParams
+    from urban_processing.params.resume import ResumeParams
     from urban_processing.params.rules import Preset
     from urban_processing.params.subdivide import Strategy, SubdivideParams
     from urban_processing.params.transfer import TransferParams
@@ -48,9 +52,11 @@ _HOME = {
     "GeoFabric": "urban_processing.io.measured",
     "GeoLayers": "urban_processing.io.frames",
     "GeoLayout": "urban_processing.io.frames",
+    "GeoSession": "urban_processing.io.sessions",
     "MeasureParams": "urban_processing.params.measure",
     "OptimizeParams": "urban_processing.params.optimize",
     "Preset": "urban_processing.params.rules",
+    "ResumeParams": "urban_processing.params.resume",
     "Strategy": "urban_processing.params.subdivide",
     "StreetPattern": "urban_processing.params.cogenerate",
     "SubdivideParams": "urban_processing.params.subdivide",
@@ -62,6 +68,8 @@ _HOME = {
     "measure": "urban_processing.api",
     "optimize": "urban_processing.api",
     "read_layout": "urban_processing.io.files",
+    "resume": "urban_processing.api",
+    "steer": "urban_processing.api",
     "subdivide": "urban_processing.api",
     "transfer": "urban_processing.api",
 }
@@ -75,9 +83,11 @@ __all__ = [
     "GeoFabric",
     "GeoLayers",
     "GeoLayout",
+    "GeoSession",
     "MeasureParams",
     "OptimizeParams",
     "Preset",
+    "ResumeParams",
     "Strategy",
     "StreetPattern",
     "SubdivideParams",
@@ -91,6 +101,8 @@ __all__ = [
     "measure",
     "optimize",
     "read_layout",
+    "resume",
+    "steer",
     "subdivide",
     "transfer",
 ]

@@ -215,6 +215,9 @@ PARCELS = Layer(
     shown=True,
 )
 
+STEERING_COLUMNS = ("stage", "quota")
+"""Columns of parcels that only a layout in the making needs."""
+
 STREETS = Layer(
     "streets",
     GeometryType.LINE,

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+import shapely.ops
+from shapely import affinity
 
 from urban_processing.errors import BoundaryError, EditError
 from urban_processing.hashing import child, splitmix64, unmixed
@@ -483,3 +485,89 @@ def test_provenance_tells_what_was_done(session: Session) -> None:
     assert steered.algorithm == "steer"
     assert [edit["edit"] for edit in steered.parameters["edits"]] == ["step", "step", "lock"]
     assert steered.results["level"] == 2
+
+
+# hand edits
+
+
+def layers_of(session: Session) -> tuple[list[shapely.Polygon], list[shapely.LineString]]:
+    """Parcels and streets on the map, as a GIS shows them."""
+    layout = session.layout
+    origin = np.asarray(layout.frame.origin)
+    mesh = layout.mesh
+    ends = mesh.xy[mesh.origin.reshape(-1, 2)[layout.edge_street]] + origin
+    return list(mesh.face_polygons(layout.frame.origin)), list(shapely.linestrings(ends))
+
+
+def test_layers_that_nobody_edited_change_nothing(land: Site, session: Session) -> None:
+    stepped(session, 4)
+    session.lock(session.parcels[3], "park")
+    session.choose(session.parcels[0], 1)
+    before = session.layout
+    change = session.adopt(*layers_of(session))
+    after = session.layout
+    assert change.gone == change.new == ()
+    assert "kept as they were" in change.sentence
+    assert after.mesh.face_area == pytest.approx(before.mesh.face_area)
+    for name in ("face_lineage", "face_level", "face_locked", "face_use", "face_stage"):
+        assert np.array_equal(getattr(after, name), getattr(before, name)), name
+    assert after.edge_street.sum() == before.edge_street.sum()
+    assert after.steered(Steering.KEPT).sum() == before.steered(Steering.KEPT).sum()
+    session.finish()
+    assert_sound(session.layout, land)
+
+
+def test_a_parcel_that_was_split_by_hand(land: Site, session: Session) -> None:
+    stepped(session, 3)
+    session.lock(session.parcels[1], "park")
+    polygons, lines = layers_of(session)
+    number = session.parcels[0]
+    box = polygons[0].minimum_rotated_rectangle.exterior.coords
+    middle = [np.mean([box[k], box[k + 1]], axis=0) for k in (0, 2)]
+    knife = shapely.LineString(middle)
+    pieces = [*shapely.ops.split(polygons[0], affinity.scale(knife, 1.5, 1.5)).geoms]
+    assert len(pieces) == 2
+    change = session.adopt([*pieces, *polygons[1:]], lines)
+    assert len(change.new) in (1, 2)
+    assert len(session.parcels) == 9
+    layout = session.layout
+    assert layout.face_locked.sum() == 1
+    assert len(set(layout.face_lineage.tolist())) == 9
+    assert_sound(layout, land)
+    assert number in change.gone or number in session.parcels
+
+
+def test_a_street_that_was_drawn_and_one_that_was_deleted_by_hand(
+    land: Site, session: Session
+) -> None:
+    stepped(session, 4)
+    polygons, lines = layers_of(session)
+    a, b = neighbours_without_street(session)
+    faces = [session.parcels.index(number) for number in (a, b)]
+    between = shapely.line_merge(shapely.intersection(*(polygons[face].exterior for face in faces)))
+    session.adopt(polygons, [*lines, between])
+    layout = session.layout
+    drawn = layout.edge_fixed >= 0
+    assert layout.mesh.edge_length[drawn].sum() == pytest.approx(between.length, rel=1e-6)
+    session.step()
+    assert (session.layout.edge_fixed >= 0).any()
+    assert_sound(session.layout, land)
+
+
+@pytest.mark.parametrize("what", ["overlap", "gap", "off", "none"])
+def test_layers_that_do_not_fit_are_refused(session: Session, what: str) -> None:
+    stepped(session, 3)
+    polygons, lines = layers_of(session)
+    digest = session.layout.digest
+    if what == "overlap":
+        polygons[0] = polygons[0].buffer(4.0, join_style="mitre")
+    elif what == "gap":
+        inner = session.layout.rim_parcel
+        polygons[int(np.argmin(inner))] = polygons[int(np.argmin(inner))].buffer(-5.0)
+    elif what == "off":
+        lines.append(shapely.LineString([(1000, 2000), (1400, 2240)]))
+    else:
+        polygons = []
+    with pytest.raises(EditError, match=r"overlap|belong to none|split the parcels|No parcel"):
+        session.adopt(polygons, lines)
+    assert session.layout.digest == digest

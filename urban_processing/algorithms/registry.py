@@ -11,6 +11,7 @@ from urban_processing.algorithms.compare import COMPARE
 from urban_processing.algorithms.export import EXPORT
 from urban_processing.algorithms.measure import MEASURE
 from urban_processing.algorithms.optimize import OPTIMIZE
+from urban_processing.algorithms.resume import RESUME
 from urban_processing.algorithms.spec import AlgorithmSpec
 from urban_processing.algorithms.subdivide import SUBDIVIDE
 from urban_processing.algorithms.transfer import TRANSFER_SPEC
@@ -18,6 +19,7 @@ from urban_processing.errors import ParameterError
 
 _SPECS = (
     COGENERATE,
+    RESUME,
     OPTIMIZE,
     BLOCKS,
     SUBDIVIDE,

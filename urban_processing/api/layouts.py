@@ -9,18 +9,18 @@ from typing import Any
 import numpy.typing as npt
 
 from urban_processing.api.gathering import gathered
+from urban_processing.api.land import land_and_params
 from urban_processing.errors import BoundaryError
-from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.features import Source
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayers, GeoLayout
 from urban_processing.io.layouts import read_layers
 from urban_processing.layout import Layout
-from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.params.optimize import OptimizeParams
+from urban_processing.params.resume import PARCEL_LAYER, ResumeParams
 from urban_processing.pipelines import cogenerate as pipeline
 from urban_processing.pipelines import optimize as optimization
-from urban_processing.pipelines.ground import given_layers
+from urban_processing.pipelines import resume as going_on
 from urban_processing.progress import MANY_PARCELS, SILENT, Progress
 from urban_processing.site import Site
 
@@ -77,19 +77,18 @@ def cogenerate(
     >>> bool(layout.parcels.area_m2.min() >= 1500)
     True
     """
-    layers = {
-        "streets": streets,
-        "obstacles": obstacles,
-        "locked": locked,
-        "rim_lines": rim_lines,
-        "entries": entries,
-    }
-    given = [name for name, value in layers.items() if value is not None]
-    if isinstance(boundary, Site):
-        given += given_layers(boundary)
-    params, site = gathered(
-        lambda: CogenerateParams.from_values(parameters, given),
-        lambda: _site(boundary, crs=crs, layer=layer, where=where, corners=corners, **layers),
+    site, params = land_and_params(
+        boundary,
+        parameters,
+        crs=crs,
+        layer=layer,
+        where=where,
+        corners=corners,
+        streets=streets,
+        obstacles=obstacles,
+        locked=locked,
+        rim_lines=rim_lines,
+        entries=entries,
     )
     expected = pipeline.estimate(site, params)
     if expected.parcels > MANY_PARCELS and progress is SILENT:
@@ -153,16 +152,72 @@ def optimize(
     return GeoLayout(optimization.optimize(given, params, progress))
 
 
+def resume(
+    layout: GeoLayout | Layout | str | PathLike[str] | None = None,
+    *,
+    parcels: Source | None = None,
+    streets: Source | None = None,
+    progress: Progress = SILENT,
+    **parameters: Any,
+) -> GeoLayout:
+    """Go on with a layout that stopped at a level, as it is or after it was edited by hand.
+
+    The levels that are still to come (Chen 2024, section 4) and what comes after them, with the
+    parameters that the layout was begun with.
+
+    Parameters
+    ----------
+    layout
+        A layout, or a layout file, whose parcels and streets may have been edited.
+    parcels, streets
+        Instead: polygons and lines, as files, GeoDataFrames or geometries; columns of the parcels
+        such as level, locked or stage count. Then `min_area` is needed.
+    progress
+        Told how far the work is; may stop it.
+    **parameters
+        Fields of `ResumeParams`.
+
+    Returns
+    -------
+    GeoLayout
+        The same as of one run, where nothing was edited.
+
+    Raises
+    ------
+    BoundaryError, ParameterError
+        With everything that is wrong.
+
+    References
+    ----------
+    Chen, W. et al. (2024). Hierarchical co-generation of parcels and streets in urban modeling.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> land = shapely.box(0, 0, 200, 120)
+    >>> begun = cogenerate(land, crs="EPSG:32630", min_area=1500, stop_at_level=2)
+    >>> len(begun.parcels), len(resume(begun).parcels)
+    (4, 12)
+    """
+    given_layers = [] if parcels is None else [PARCEL_LAYER]
+    params, given = gathered(
+        lambda: ResumeParams.from_values(parameters, given_layers),
+        lambda: _layout(layout, parcels, streets, ResumeParams.usable(parameters)),
+    )
+    return GeoLayout(going_on.resume(given, params, progress))
+
+
 def _layout(
     layout: GeoLayout | Layout | str | PathLike[str] | None,
     parcels: Source | None,
     streets: Source | None,
-    params: OptimizeParams,
+    params: OptimizeParams | ResumeParams | None,
 ) -> Layout:
     if (layout is None) == (parcels is None) or (parcels is None) != (streets is None):
         raise BoundaryError("Give a layout, or parcels and streets.")
+    snap = OptimizeParams.snap if params is None else params.snap
     if layout is None:
-        return read_layers(parcels, streets, snap=params.snap)
+        return read_layers(parcels, streets, snap=snap)
     if isinstance(layout, GeoLayout):
         return layout.layout
     if isinstance(layout, Layout):
@@ -176,13 +231,4 @@ def _layout(
         raise BoundaryError(
             f"{type(layout).__name__} is no layout: give what cogenerate made, or its file."
         )
-    return read_layout(layout, snap=params.snap).layout
-
-
-def _site(boundary: Source | Site, **options: Any) -> Site:
-    if not isinstance(boundary, Site):
-        return read_boundary(boundary, **options)
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise BoundaryError(f"A Site is ready as it is: leave out {', '.join(given)}.")
-    return boundary
+    return read_layout(layout, snap=snap).layout

@@ -37,7 +37,7 @@ def prepare(spec: AlgorithmSpec, given: Mapping[str, Any]) -> Call:
         If a place cannot be looked up.
     """
     values = values_given(spec, given)
-    layers = [i.name for i in spec.inputs if i.kind.of_site and given[i.name] is not None]
+    layers = [i.name for i in spec.inputs if not i.required and given[i.name] is not None]
     problems = spec.params.problems_with(values, layers=layers)
     problems += _output_problems(spec, given)
     inputs: dict[str, Any] = {}

@@ -14,6 +14,7 @@ from urban_processing.schema import (
     PART,
     PROVENANCE,
     RIGHT_OF_WAY,
+    STEERING_COLUMNS,
     STREETS,
     TRUE_AREA,
     Column,
@@ -22,7 +23,7 @@ from urban_processing.schema import (
     Layer,
 )
 
-_LAYOUTS_ALONE = ("level", "locked", "lineage", "fixed_id")
+_LAYOUTS_ALONE = ("level", "locked", "lineage", "fixed_id", *STEERING_COLUMNS)
 """Columns of a layout that say how it was made."""
 
 

@@ -13,6 +13,9 @@ from urban_processing.metrics.certificate import Certificate, certificate
 from urban_processing.metrics.tables import layout_tables
 from urban_processing.tables import Table, issues_in_words
 
+MOVED_MEAN = "moved_mean_m"
+"""Result of every optimization: how far vertices moved."""
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLayout:
@@ -56,7 +59,7 @@ class MeasuredLayout:
             ("certificate", self._certified()),
         ]
         gained = self.layout.history[-1].results if self.layout.history else {}
-        if gained:
+        if MOVED_MEAN in gained:  # other steps have other results, or none
             rows.append(("energies", _gains(gained)))
         if self.layout.issues:
             counted = issues_in_words(self.layout.issues)
@@ -104,7 +107,5 @@ def _gains(results: Mapping[str, float]) -> str:
         energy = name.removeprefix("energy_").removesuffix("_before")
         if name == f"energy_{energy}_before":
             energies.append(f"{energy} {value:.3g} to {results[f'energy_{energy}_after']:.3g}")
-    moved = (
-        f"moved {results['moved_mean_m']:.3g} m on average, {results['moved_max_m']:.3g} m at most"
-    )
+    moved = f"moved {results[MOVED_MEAN]:.3g} m on average, {results['moved_max_m']:.3g} m at most"
     return f"{', '.join(energies)}; {moved}"

@@ -13,6 +13,7 @@ from urban_processing.schema import (
     PARCELS,
     PART,
     PROVENANCE,
+    STEERING_COLUMNS,
     TRUE_AREA,
     Column,
     ColumnType,
@@ -42,7 +43,7 @@ SUBDIVIDED_PARCELS = Layer(
     PARCELS.name,
     GeometryType.POLYGON,
     (
-        *(_of_blocks(column) for column in PARCELS.columns),
+        *(_of_blocks(c) for c in PARCELS.columns if c.name not in STEERING_COLUMNS),
         BLOCK_ID,
         Column("strategy", ColumnType.TEXT, "", "Strategy that made the parcel.", "Strategy"),
         Column(

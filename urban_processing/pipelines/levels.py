@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +23,9 @@ from urban_processing.pipelines.dimensions import check_dimensions, missed_dimen
 from urban_processing.pipelines.findings import findings
 from urban_processing.pipelines.ground import land_area, lay_ground, settle_islands
 from urban_processing.pipelines.last_levels import divide_street_blocks
-from urban_processing.pipelines.quotas import divided, shared_out
 from urban_processing.progress import SILENT, Progress
+from urban_processing.provenance import Step
+from urban_processing.quotas import divided, shared_out
 from urban_processing.rebuild import canonical
 from urban_processing.rights_of_way import lay_out_rights_of_way
 from urban_processing.rights_of_way.net_floor import gross_floor, keep_net_areas, set_remnants_aside
@@ -286,35 +289,70 @@ def progress_of(state: State) -> dict[str, float]:
     }
 
 
-def state_of(layout: Layout) -> State:
-    """The state of a layout that co-generation made, to go on from there.
+def state_of(layout: Layout, *, min_area: float | None = None) -> State:
+    """The state of a layout, to go on from there.
+
+    Parameters
+    ----------
+    layout
+        Made by co-generation; or by anything else, if the smallest area is given.
+    min_area
+        Smallest parcel allowed from now on, m², in place of what the layout was begun with.
 
     Raises
     ------
     BoundaryError
-        If co-generation did not make it.
+        If no smallest area is given, now or before, and co-generation did not make the layout.
     """
-    made = [step for step in layout.history if step.algorithm == ALGORITHM]
-    told = [step.results for step in layout.history if LEVEL in step.results]
-    if not made or not told:
+    begun = _begun_with(layout.history, min_area)
+    if begun is None:
         raise BoundaryError(
             "The layout does not say what it was begun with: it was not made by cogenerate, or by "
-            "an older version of it. Lay out its land again."
+            "an older version of it. Give min_area (--min-area), the smallest parcel allowed in "
+            "m², to go on with it."
         )
-    params = CogenerateParams.from_values({**made[-1].parameters, "stop_at_level": None})
+    params = CogenerateParams.from_values(begun)
     rules = params.street_rules
-    completed = bool(told[-1].get(FINISHED))
-    net = rules.net_min_area and completed
+    told = [step.results for step in layout.history if LEVEL in step.results]
+    results = told[-1] if told else {LEVEL: 0.0, BLOCKS_DIVIDED: 0.0}
+    completed = bool(results.get(FINISHED))
+    floor = layout.min_area
+    if min_area is not None:
+        floor = gross_floor(min_area, rules) if rules.net_min_area else min_area
+    elif rules.net_min_area and completed:
+        floor = gross_floor(layout.min_area, rules)
+    issues = tuple(issue for issue in layout.issues if issue.code != STOPPED)
     return State(
-        layout=layout.replace(
-            issues=tuple(issue for issue in layout.issues if issue.code != STOPPED)
-        ),
+        layout=layout.replace(issues=issues, min_area=floor),
         params=params,
-        min_area=gross_floor(layout.min_area, rules) if net else layout.min_area,
-        level=int(told[-1][LEVEL]),
-        blocks_divided=bool(told[-1][BLOCKS_DIVIDED]),
+        min_area=floor,
+        level=int(results[LEVEL]),
+        blocks_divided=bool(results[BLOCKS_DIVIDED]),
         completed=completed,
     )
+
+
+def _begun_with(history: Sequence[Step], min_area: float | None) -> dict[str, Any] | None:
+    """Values of the parameters that a layout goes on with; None where nothing says them.
+
+    They are those of its last co-generation. A smallest area that was given since, in going on,
+    takes the place of the size they had.
+    """
+    values: dict[str, Any] | None = None
+    sizes: list[float | None] = []
+    for step in history:
+        if step.algorithm == ALGORITHM:
+            values, sizes = {**step.parameters, "stop_at_level": None}, []
+        elif LEVEL in step.results:
+            sizes.append(step.parameters.get("min_area"))
+    if values is not None and not any(LEVEL in step.results for step in history):
+        values = None  # an older version made it, whose levels are not known
+    given = [size for size in (*sizes, min_area) if size is not None]
+    if not given:
+        return values
+    # streets of layers have no rights-of-way unless somebody laid them out
+    begun = {"right_of_way": False} if values is None else values
+    return {**begun, "min_area": given[-1], "parcels": None}
 
 
 def finish(state: State, progress: Progress = SILENT) -> tuple[Layout, dict[str, float]]:

@@ -19,19 +19,20 @@ def resume(layout: Layout, params: ResumeParams, progress: Progress = SILENT) ->
     Parameters
     ----------
     layout
-        A layout that `cogenerate` made and stopped at a level; it may have been edited since.
+        A layout that `cogenerate` made and stopped at a level; it may have been edited since. Or
+        any other, if the smallest area is given.
     params
-        Where to stop again.
+        The smallest area where it is another than before, and where to stop again.
     progress
         Told of every level and of what comes after them; may cancel between these steps.
 
     Raises
     ------
     BoundaryError
-        If co-generation did not make the layout.
+        If co-generation did not make the layout, and no smallest area is given.
     """
     started = time.perf_counter()
-    state = state_of(layout)
+    state = state_of(layout, min_area=params.min_area)
     made, results = go_on(state, stop_at=params.stop_at_level, progress=progress)
     entry = Step(
         algorithm="resume",

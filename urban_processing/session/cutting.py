@@ -16,7 +16,7 @@ from urban_processing.layout import Layout, Steering
 from urban_processing.mesh.edit import MeshEditor
 from urban_processing.mesh.planar import FloatArray, IntArray, linear_rings
 from urban_processing.pipelines.levels import State
-from urban_processing.pipelines.quotas import divided
+from urban_processing.quotas import divided
 from urban_processing.session.drawn_line import SAME_PLACE, as_line, as_points
 from urban_processing.session.moment import Moment
 from urban_processing.session.wording import areas_named, parcels_named

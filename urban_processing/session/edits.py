@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 
 from urban_processing.errors import EditError
 from urban_processing.layout import GivenStreet
@@ -15,17 +16,21 @@ from urban_processing.pipelines import levels
 from urban_processing.pipelines.cogenerate import go_on
 from urban_processing.pipelines.levels import State
 from urban_processing.progress import Progress
-from urban_processing.session import parcel_edits, street_edits
+from urban_processing.session import adoption, parcel_edits, street_edits
 from urban_processing.session.moment import Moment
-from urban_processing.session.places import face_of, local, reach_of, snap_of
+from urban_processing.session.places import LEAST_SNAP, face_of, local, reach_of, snap_of
 from urban_processing.session.reading import (
     Place,
+    Rings,
     flag,
+    lines,
+    number,
     number_or_none,
     parcel,
     parcels,
     place,
     points,
+    polygons,
     text,
     text_or_none,
     whole,
@@ -51,6 +56,10 @@ class Edit:
     def done(self, moment: Moment) -> tuple[State, str]:
         """Return the state after an edit that takes no time, and what was done."""
         raise NotImplementedError
+
+    def told(self) -> dict[str, Any]:
+        """Return what provenance tells of the edit."""
+        return self.as_dict()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the edit for JSON; what has its default is left out."""
@@ -203,6 +212,35 @@ class RemoveStreet(Edit):
 
 
 @dataclass(frozen=True)
+class Adopt(Edit):
+    """Take over parcels and streets that were edited by hand."""
+
+    parcels: tuple[Rings, ...] = field(metadata=_by(polygons))
+    streets: tuple[tuple[Place, ...], ...] = field(metadata=_by(lines))
+    snap: float = field(default=LEAST_SNAP, metadata=_by(number))
+    name: ClassVar[str] = "adopt"
+
+    def told(self) -> dict[str, Any]:
+        """Return how much was taken over; what it was stands in the layout."""
+        counts = {"parcels": len(self.parcels), "streets": len(self.streets)}
+        return {"edit": self.name, **counts, "snap": self.snap}
+
+    def done(self, moment: Moment) -> tuple[State, str]:
+        """Take them over."""
+        shapes = [
+            shapely.Polygon(local(moment, shell), [local(moment, hole) for hole in holes])
+            for shell, *holes in self.parcels
+        ]
+        drawn = [shapely.LineString(local(moment, line)) for line in self.streets]
+        return adoption.adopt(
+            moment,
+            np.array(shapes, dtype=object),
+            np.array(drawn, dtype=object),
+            snap=self.snap,
+        )
+
+
+@dataclass(frozen=True)
 class Finish(Edit):
     """Lay out the levels that are still to come, clean up and optimize."""
 
@@ -228,7 +266,7 @@ KINDS: Mapping[str, type[Edit]] = {
     kind.name: kind
     for kind in (
         *(TakeStep, Choose, Cut, UndoCut, Lock, Unlock, Merge, AddStreet, RemoveStreet),
-        Finish,
+        *(Adopt, Finish),
     )
 }
 """All edits by the name that they have in files."""

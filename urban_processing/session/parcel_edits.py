@@ -15,7 +15,7 @@ from urban_processing.errors import EditError
 from urban_processing.layout import NOT_FIXED, Layout, Stage
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.pipelines.levels import State
-from urban_processing.pipelines.quotas import divided
+from urban_processing.quotas import divided
 from urban_processing.session.candidates import candidates
 from urban_processing.session.cutting import cut_faces, path_across
 from urban_processing.session.halves import ahead, with_kept_cuts

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+import shapely
 
 from urban_processing.errors import EditError
 
+MIN_RING = 3
+"""Places that a ring has at least."""
+
 Place = tuple[float, float]
+Rings = tuple[tuple[Place, ...], ...]
+"""The shell of a polygon, and its holes."""
 
 
 def whole(value: Any) -> int:
@@ -22,8 +28,11 @@ def whole(value: Any) -> int:
 
 def number_or_none(value: Any) -> float | None:
     """A number of metres, not negative, or nothing."""
-    if value is None:
-        return None
+    return None if value is None else number(value)
+
+
+def number(value: Any) -> float:
+    """A number of metres, not negative."""
     known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not known or not math.isfinite(value) or value < 0:
         raise EditError(f"must be a number of metres, 0 or more; it is {value!r}.")
@@ -67,6 +76,37 @@ def points(value: Any) -> tuple[Place, ...]:
     if xy.ndim != 2 or xy.shape[1] != 2 or len(xy) < 2:
         raise EditError("must be a line of at least two points, each with x and y.")
     return tuple((float(x), float(y)) for x, y in xy)
+
+
+def lines(value: Any) -> tuple[tuple[Place, ...], ...]:
+    """Several lines, of which those in parts are several."""
+    return tuple(points(part) for each in _several(value) for part in _parts(each))
+
+
+def polygons(value: Any) -> tuple[Rings, ...]:
+    """Several polygons: their rings, or geometries."""
+    return tuple(_rings(part) for each in _several(value) for part in _parts(each))
+
+
+def _rings(value: Any) -> Rings:
+    if isinstance(value, shapely.Polygon):
+        value = [value.exterior, *value.interiors]
+    rings = tuple(points(ring) for ring in _several(value))
+    if not rings or any(len(ring) < MIN_RING for ring in rings):
+        raise EditError("must be polygons: rings of at least three places each.")
+    return rings
+
+
+def _parts(value: Any) -> list[Any]:
+    if not isinstance(value, shapely.Geometry):
+        return [value]
+    return [part for part in shapely.get_parts(shapely.force_2d(value)) if not part.is_empty]
+
+
+def _several(value: Any) -> Iterable[Any]:
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise EditError(f"must be a list; it is {value!r}.")
+    return value
 
 
 def parcel(value: Any) -> int | Place:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
 import numpy.typing as npt
+import shapely
 
 from urban_processing.errors import EditError, UrbanError
 from urban_processing.layout import Layout
@@ -116,7 +117,7 @@ class Session:
             return state.layout
         entry = Step(
             algorithm=STEER,
-            parameters={"edits": [edit.as_dict() for edit in self.edits]},
+            parameters={"edits": [edit.told() for edit in self.edits]},
             seed=state.params.seed,
             version=__version__,
             input_sha256=self._start.sha256,
@@ -262,6 +263,28 @@ class Session:
         Parcels that need another street get one.
         """
         return self.do("remove_street", place=place, reach=reach)
+
+    def adopt(
+        self,
+        parcels: Iterable[shapely.Geometry],
+        streets: Iterable[shapely.Geometry],
+        *,
+        snap: float | None = None,
+    ) -> Change:
+        """Take over parcels and streets that were edited by hand, in a GIS.
+
+        Parcels that are the same as before keep their numbers and what is known of them.
+
+        Parameters
+        ----------
+        parcels
+            Polygons that cover the land without overlaps and gaps.
+        streets
+            Lines along their boundaries, those of the rim included.
+        snap
+            Metres within which they fit together.
+        """
+        return self.do("adopt", parcels=parcels, streets=streets, snap=snap)
 
     def do(self, name: str, progress: Progress = SILENT, **values: Any) -> Change:
         """Do an edit by its name in files; values that are None are left out.
