@@ -16,6 +16,8 @@ pytest.importorskip("qgis.core", reason="QGIS is not here")
 from in_qgis import square
 from qgis.core import (
     QgsCoordinateReferenceSystem,
+    QgsFeature,
+    QgsGeometry,
     QgsPointXY,
     QgsProject,
     QgsRectangle,
@@ -145,8 +147,8 @@ def plugin(provider: Any, qgis_iface: Any, qgis_new_project: None) -> Iterator[A
 @pytest.fixture
 def table(plugin: Any, qgis_iface: Any) -> Table:
     canvas = qgis_iface.mapCanvas()
+    canvas.window().show()
     canvas.resize(640, 640)
-    canvas.show()
     QCoreApplication.processEvents()
     assert canvas.viewport().width() > 600
     canvas.setDestinationCrs(QgsCoordinateReferenceSystem("EPSG:32630"))
@@ -453,6 +455,57 @@ def test_layers_that_were_taken_away_come_back(begun: Table) -> None:
     begun.wait()
     begun.click(begun.panel.undo)
     assert len(begun.features) == begun.view.parcels == 2
+
+
+def test_hand_edits_are_taken_over(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    assert begun.panel.adopt.isHidden() or not begun.panel.adopt.isVisible()
+    layer = begun.steering.layers.parcels.layer
+    layer.startEditing()
+    assert not begun.panel.step.isEnabled()
+    assert "hand" in begun.panel.step.toolTip()
+    one, other = begun.features.values()
+    joined = one.geometry().combine(other.geometry())
+    layer.changeGeometry(one.id(), joined)
+    layer.deleteFeature(other.id())
+    begun.click(begun.panel.adopt)
+    assert not layer.isEditable()
+    [whole] = begun.features.values()
+    assert whole.geometry().area() == pytest.approx(SIDE**2)
+    assert begun.view.can_undo
+    begun.click(begun.panel.undo)
+    assert len(begun.features) == 2
+
+
+def test_hand_edits_that_do_not_fit_stay_to_be_corrected(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    layer = begun.steering.layers.parcels.layer
+    layer.startEditing()
+    one, other = begun.features.values()
+    layer.changeGeometry(one.id(), other.geometry())  # one upon the other
+    begun.click(begun.panel.adopt)
+    assert begun.panel.note.text()
+    assert begun.warnings
+    assert layer.isEditable()
+    assert begun.features[one["parcel"]].geometry().equals(other.geometry())
+    begun.click(begun.panel.discard)
+    assert not layer.isEditable()
+    assert begun.features[one["parcel"]].geometry().equals(one.geometry())
+    assert begun.panel.step.isEnabled()
+
+
+def test_hand_edits_that_were_saved_in_the_layer_count_as_well(begun: Table) -> None:
+    begun.click(begun.panel.step)
+    layer = begun.steering.layers.streets.layer
+    layer.startEditing()
+    drawn = QgsFeature(layer.fields())
+    drawn.setGeometry(QgsGeometry.fromPolylineXY([_at(0, 0), _at(SIDE, SIDE)]))
+    layer.addFeature(drawn)
+    assert layer.commitChanges()
+    assert begun.steering.layers.are_edited
+    begun.click(begun.panel.discard)
+    assert not begun.steering.layers.are_edited
+    assert layer.featureCount() == len(begun.steering.layers.streets._ids)
 
 
 def test_closing_the_dock_keeps_the_session(begun: Table) -> None:
