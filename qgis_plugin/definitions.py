@@ -87,8 +87,12 @@ sink goes to a file of its own."""
 
 
 def is_offered(spec: AlgorithmSpec) -> bool:
-    """Whether an algorithm makes layers; QGIS itself writes layers to plain files."""
-    return any(output.kind.is_geopackage for output in spec.outputs)
+    """Whether an algorithm makes layers and is none that QGIS has other ways for.
+
+    QGIS itself writes layers to plain files; sessions are opened in a panel of their own.
+    """
+    session = any(item.kind is InputKind.EDITS for item in spec.inputs)
+    return not session and any(output.kind.is_geopackage for output in spec.outputs)
 
 
 @dataclass(frozen=True)

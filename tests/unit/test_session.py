@@ -375,7 +375,7 @@ def test_unknown_parcels_say_what_became_of_them(session: Session) -> None:
     session.step()
     with pytest.raises(EditError, match="Parcel 1 is no more: it was cut into 2 and 3"):
         session.choose(1, 1)
-    with pytest.raises(EditError, match="There is no parcel at 0, 0"):
+    with pytest.raises(EditError, match=r"There is no parcel at 0\.0, 0\.0"):
         session.lock((0.0, 0.0))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from urban_processing.algorithms.inputs import GROUND
 from urban_processing.algorithms.outputs import LAYOUT_OUTPUTS
 from urban_processing.algorithms.spec import AlgorithmSpec, Estimate, Input, InputKind
 from urban_processing.params.cogenerate import CogenerateParams
@@ -49,53 +50,7 @@ COGENERATE = AlgorithmSpec(
             label="Land",
             help="The land: polygons, in a vector layer or file of any format.",
         ),
-        Input(
-            name="corners",
-            kind=InputKind.CORNER_POINTS,
-            label="Corners of the land",
-            help="Points near the boundary that are to count as corners of a freeform land; "
-            "by default corners are found by angle.",
-            required=False,
-        ),
-        Input(
-            name="streets",
-            kind=InputKind.FIXED_STREETS,
-            label="Given streets",
-            help="Lines of streets that are part of the network from the start and stay where they "
-            "are; their class and width are kept (columns class, width_m).",
-            required=False,
-        ),
-        Input(
-            name="obstacles",
-            kind=InputKind.OBSTACLES,
-            label="Obstacles",
-            help="Polygons that no cut and no street crosses: lakes, parks, protected land.",
-            required=False,
-        ),
-        Input(
-            name="locked",
-            kind=InputKind.LOCKED_LAND,
-            label="Locked land",
-            help="Polygons that stay one parcel each and are reached by street, such as an "
-            "estate that is there already; their use is kept (column land_use).",
-            required=False,
-        ),
-        Input(
-            name="rim_lines",
-            kind=InputKind.RIM_LINES,
-            label="Rim lines",
-            help="Lines along the boundary that say which part of the rim is street, or is not; "
-            "see the parameter for streets on the rim.",
-            required=False,
-        ),
-        Input(
-            name="entries",
-            kind=InputKind.ENTRY_POINTS,
-            label="Entries",
-            help="Points near the boundary where the network meets the outside; where the rim is "
-            "no street and there is none, the best place is chosen.",
-            required=False,
-        ),
+        *GROUND,
     ),
     outputs=LAYOUT_OUTPUTS,
     run=_run,

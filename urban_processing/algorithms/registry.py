@@ -8,6 +8,7 @@ from urban_processing.algorithms.blocks import BLOCKS
 from urban_processing.algorithms.calibrate import CALIBRATE
 from urban_processing.algorithms.cogenerate import COGENERATE
 from urban_processing.algorithms.compare import COMPARE
+from urban_processing.algorithms.edit import EDIT
 from urban_processing.algorithms.export import EXPORT
 from urban_processing.algorithms.measure import MEASURE
 from urban_processing.algorithms.optimize import OPTIMIZE
@@ -19,6 +20,7 @@ from urban_processing.errors import ParameterError
 
 _SPECS = (
     COGENERATE,
+    EDIT,
     RESUME,
     OPTIMIZE,
     BLOCKS,

@@ -36,6 +36,10 @@ class InputKind(enum.StrEnum):
     """Where the network meets the outside."""
     LAYOUT = "layout"
     """A layout made before, as a file; handed over as a `Layout`."""
+    STEERED = "layout or land to be edited"
+    """What a session began with, as a file; handed over together with its edits, as `Steered`."""
+    EDITS = "edits"
+    """A saved session, or a list of edits."""
     PARCEL_LAYER = "parcel layer"
     """Polygons of parcels: with the streets they stand for the file of a layout, and are handed
     over in its place."""
@@ -95,6 +99,7 @@ class InputKind(enum.StrEnum):
         """Whether such an input is one layer, of which the user may choose features."""
         return self in (
             InputKind.BOUNDARY,
+            InputKind.STEERED,
             InputKind.CENTRELINES,
             InputKind.BLOCK_LAYER,
             InputKind.OBSERVED_PARCELS,

@@ -97,6 +97,33 @@ def _read_layout(
     return read_layers(parcels, streets, snap=snap or 0.0)
 
 
+@_collecting
+def _read_steered(
+    spec: AlgorithmSpec, item: Input, given: Mapping[str, Any], problems: list[str]
+) -> Any:
+    """Read what a session began with, and its edits."""
+    edits = next(i for i in spec.inputs if i.kind is InputKind.EDITS)
+    missing = [i for i in (item, edits) if given[i.name] is None]
+    problems += [f"Give {option_name(i.name).upper()}, {_lower_first(i.help)}" for i in missing]
+    if missing:
+        return None
+    from urban_processing.io.sessions import read_start
+    from urban_processing.session.files import Steered, read
+
+    saved = None
+    try:
+        saved = read(given[edits.name])
+    except UrbanError as error:
+        problems += error.problems
+    start = read_start(
+        given[item.name],
+        snap=_snap(spec, given) or 0.0,
+        **{name: given[name] for name in ("layer", "where", "crs")},
+        **{i.kind.of_site: given[i.name] for i in spec.inputs if i.kind.of_site},
+    )
+    return None if saved is None else Steered(start, saved)
+
+
 def _snap(spec: AlgorithmSpec, given: Mapping[str, Any]) -> float | None:
     """Tolerance with which edited layers are read, the default where it is no number.
 
@@ -302,6 +329,7 @@ _EDITIONS = (
 READERS: Mapping[InputKind, Reader] = {
     InputKind.BOUNDARY: _read_boundary,
     InputKind.LAYOUT: _read_layout,
+    InputKind.STEERED: _read_steered,
     InputKind.CENTRELINES: _read_centrelines,
     InputKind.BLOCK_LAYER: _read_blocks,
     InputKind.OBSERVED_PARCELS: _read_observed,

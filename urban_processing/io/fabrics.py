@@ -130,10 +130,15 @@ def source_name(source: Any) -> str:
     return Path(fspath(path)).stem if isinstance(path, str | PathLike) else ""
 
 
+def is_layout_file(source: str | PathLike[str]) -> bool:
+    """Return whether a file is one of a layout."""
+    return _state(source, LAYOUT_STATE) is not None
+
+
 def is_ready(source: Any) -> bool:
     """Return whether a source is a layout or a fabric, to which no layers can be added."""
     if isinstance(source, str | PathLike):
-        return _state(source, LAYOUT_STATE) is not None
+        return is_layout_file(source)
     return isinstance(source, Fabric | GeoFabric | MeasuredLayout | Layout)
 
 

@@ -1,12 +1,46 @@
-"""`GeoSession`: a steering session whose parcels, streets and candidates are GeoDataFrames."""
+"""Steering sessions from files, and with parcels, streets and candidates as GeoDataFrames."""
 
 from __future__ import annotations
+
+from os import PathLike
+from typing import Any
 
 import geopandas as gpd
 import pandas as pd
 
+from urban_processing.errors import BoundaryError
+from urban_processing.io.boundaries import read_boundary
+from urban_processing.io.fabrics import is_layout_file
+from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayout
+from urban_processing.layout import Layout
 from urban_processing.session.session import Session
+from urban_processing.site import Site
+
+
+def read_start(start: str | PathLike[str], *, snap: float, **options: Any) -> Site | Layout:
+    """Read what a session began with: a layout file, or land.
+
+    Parameters
+    ----------
+    start
+        The layout file, or the file of the land.
+    snap
+        Metres within which parcels and streets of an edited layout file are fitted together.
+    **options
+        With land: as in `urban_processing.io.boundaries.read_boundary`.
+
+    Raises
+    ------
+    BoundaryError
+        If the file is neither, or something is given that a layout has already.
+    """
+    if not is_layout_file(start):
+        return read_boundary(start, **options)
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise BoundaryError(f"{start} is a layout: leave out {', '.join(sorted(given))}.")
+    return read_layout(start, snap=snap).layout
 
 
 class GeoSession(Session):

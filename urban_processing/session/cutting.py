@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -74,7 +73,7 @@ class Joint:
 def cut_faces(moment: Moment, paths: Mapping[int, FloatArray]) -> State:
     """Cut parcels, each along a path that begins and ends on its boundary.
 
-    The ends move a little to a corner or vertex nearby, as those of cuts along streamlines do.
+    The ends move a little to a corner or vertex nearby, so that no edge is too short.
     The cuts are kept: parcels are not joined across them later. The halves go on to be cut like
     their parcel, and share the number of parcels that it was to become.
 
@@ -137,11 +136,16 @@ def path_across(moment: Moment, face: int, line: object, *, snap: float) -> Floa
     ring = np.stack([mesh.xy[mesh.origin[h]], mesh.xy[mesh.target[h]]], axis=1)
     parcel = shapely.Polygon(ring[:, 0])
     at = drawn.crossings(ring, beyond=snap)
-    stops = np.unique(np.concatenate([at, [0.0, drawn.length]]))
-    middle = shapely.points([drawn.at(0.5 * (a + b)) for a, b in itertools.pairwise(stops)])
-    inside = shapely.contains_properly(parcel, middle)
-    inside &= ~shapely.dwithin(parcel.exterior, middle, SAME_PLACE)
-    runs = np.column_stack([stops[:-1], stops[1:]])[inside]
+    stops = at[(at >= -SAME_PLACE) & (at <= drawn.length + SAME_PLACE)]
+    # an end inside the parcel goes on to its boundary, if that is near
+    if _is_within(parcel, drawn.xy[0]):
+        ahead = at[at < -SAME_PLACE]
+        stops = np.append(ahead[-1:] if len(ahead) else 0.0, stops)
+    if _is_within(parcel, drawn.xy[-1]):
+        ahead = at[at > drawn.length + SAME_PLACE]
+        stops = np.append(stops, ahead[:1] if len(ahead) else drawn.length)
+    runs = np.column_stack([stops[:-1], stops[1:]])
+    runs = runs[[_is_within(parcel, drawn.at(s)) for s in runs.mean(axis=1).tolist()]]
     ends_on = np.isin(runs, at).all(axis=1)
     whole = runs[ends_on]
     if not len(runs):
@@ -157,6 +161,13 @@ def path_across(moment: Moment, face: int, line: object, *, snap: float) -> Floa
         )
     start, stop = whole[0].tolist()
     return np.vstack([drawn.at(start), drawn.between(start, stop), drawn.at(stop)])
+
+
+def _is_within(parcel: shapely.Polygon, place: FloatArray) -> bool:
+    """Whether a place lies in a parcel, and not on its boundary."""
+    point = shapely.Point(place)
+    inside = shapely.contains_properly(parcel, point)
+    return bool(inside and not shapely.dwithin(parcel.exterior, point, SAME_PLACE))
 
 
 def check_can_be_cut(moment: Moment, faces: Sequence[int]) -> None:
@@ -219,7 +230,8 @@ def spot_on(
     k = int(np.lexsort((feet[:, 1], feet[:, 0], off))[0])
     foot, h = feet[k], int(half_edges[k])
     sides = mesh.face.reshape(-1, 2)[h >> 1]
-    scale = math.sqrt(float(mesh.face_area[sides[sides >= 0]].min()))
+    # not that of the parcel: what is far for the smallest one, somebody may have meant
+    scale = math.sqrt(min(float(mesh.face_area[sides[sides >= 0]].min()), 2.0 * layout.min_area))
     far = np.round(np.hypot(*(mesh.xy[among] - foot).T), 9)
     node = (mesh.valence[among] > 2) | layout.vertex_corner[among]
     near = far <= np.where(node, max(reach, TEE_SNAP * scale), VERTEX_SNAP * scale)

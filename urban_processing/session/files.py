@@ -15,7 +15,7 @@ from urban_processing.layout_file.writing import replacing
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.paths import ending_problems, replaced_problems
 from urban_processing.session.edits import Edit, make_edit
-from urban_processing.site import Site
+from urban_processing.site import Frame, Issue, Site
 from urban_processing.version import __version__
 
 FORMAT = "urban_processing steering"
@@ -131,6 +131,24 @@ class Saved:
             f"version {self.software}, and to {layout.mesh.n_faces:,} with version {__version__}: "
             "do them again by hand, or use that version."
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Steered:
+    """A saved session together with what it began with."""
+
+    start: Site | Layout
+    saved: Saved
+
+    @property
+    def frame(self) -> Frame:
+        """Where it lies."""
+        return self.start.frame
+
+    @property
+    def issues(self) -> tuple[Issue, ...]:
+        """What was repaired in reading the land."""
+        return self.start.issues if isinstance(self.start, Site) else ()
 
 
 def _with_article(kind: str) -> str:

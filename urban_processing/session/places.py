@@ -33,7 +33,7 @@ def face_of(moment: Moment, parcel: int | Place) -> int:
         return moment.face(parcel)
     face = moment.face_at(local(moment, (parcel,))[0])
     if face is None:
-        raise EditError(f"There is no parcel at {parcel[0]:g}, {parcel[1]:g}.")
+        raise EditError(f"There is no parcel at {parcel[0]:.1f}, {parcel[1]:.1f}.")
     return face
 
 

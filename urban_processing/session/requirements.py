@@ -103,8 +103,8 @@ def _loose(before: Layout, after: Layout) -> list[str]:
     was = np.append(was, np.zeros(max(len(now) - len(was), 0), dtype=np.int64))[: len(now)]
     several = len(now) > 1
     return [
-        f"The streets{f' of part {part + 1} of the land' if several else ''} would fall into "
-        f"{now[part]} pieces that are not connected."
+        f"The streets{f' in part {part + 1} of the land' if several else ''} would be in "
+        f"{now[part]} pieces that no street joins."
         for part in np.flatnonzero(now > np.maximum(was, 1)).tolist()
     ]
 

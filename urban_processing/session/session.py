@@ -384,7 +384,13 @@ class Session:
             If the file is no saved session, is of another version, was begun with something
             else, or holds an edit that cannot be done.
         """
-        saved = files.read(path)
+        return cls.replayed(files.read(path), start, progress)
+
+    @classmethod
+    def replayed(
+        cls, saved: files.Saved, start: Site | Layout, progress: Progress = SILENT
+    ) -> Self:
+        """Replay a session that was read, as `load` does."""
         if isinstance(start, Site):
             session = cls.begin(start, saved.params())
         else:

@@ -19,9 +19,9 @@ from urban_processing.session.cutting import (
     thinned,
     with_vertices,
 )
-from urban_processing.session.drawn_line import DrawnLine, as_line, as_points
+from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine, as_line, as_points
 from urban_processing.session.moment import Moment
-from urban_processing.session.street_lines import Link, Plan, barred_edges, plan_street
+from urban_processing.session.street_lines import AT_LAKE, Link, Plan, barred_edges, plan_street
 from urban_processing.session.ways import costs_near, way_along_corners, way_between
 from urban_processing.session.wording import parcels_named
 from urban_processing.streets.network import street_network
@@ -168,17 +168,21 @@ def _drawn_street(
 
     Where following boundaries leads to no legal street, the line is followed more closely.
     """
-    problem: EditError | None = None
+    problems: list[EditError] = []
     for share in SHRINKING:
         street = _resolved(moment, plan_street(moment, line, snap=share * snap, end_snap=snap))
-        if problem is None:
+        if not problems:
             check_large_enough(moment, [joint.face for joint in street.joints])
         try:
             return _laid(moment, line, street, share * snap)
         except EditError as error:
-            problem = problem or error
-    assert problem is not None
-    raise problem
+            problems.append(error)
+    # a parcel that is cut too small says more than a way that is not found
+    raise next((error for error in problems if not isinstance(error, _NoWay)), problems[0])
+
+
+class _NoWay(EditError):
+    """A street cannot follow boundaries where the line is close to them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,17 +231,17 @@ def _walk(layout: Layout, line: DrawnLine, walk: tuple[Link, int, int], snap: fl
     link, a, b = walk
     start, stop = max(link.start, 0.0), min(link.stop, line.length)
     run = np.vstack([line.at(start), line.between(start, stop), line.at(stop)])
-    xy = layout.mesh.xy
-    reach = BESIDE * snap + 1e-6
-    low, high = run.min(axis=0) - reach, run.max(axis=0) + reach
-    near = np.flatnonzero(((xy >= low) & (xy <= high)).all(axis=1))
-    off = np.full(len(xy), np.inf)
-    off[near] = shapely.distance(shapely.points(xy[near]), shapely.LineString(run))
-    off[[a, b]] = 0.0
-    way = way_between(layout, a, b, costs_near(layout, off, reach, barred_edges(layout)))
-    if way is None:
-        raise EditError(
-            "The line runs so close to a boundary that it can neither follow it nor keep clear of "
-            "it: draw it along the boundary, or farther off."
-        )
-    return np.array(way, dtype=np.int64)
+    # where it is to begin and end may be farther off than what lies between
+    ends = layout.mesh.xy[[a, b]]
+    off = shapely.distance(shapely.points(ends), shapely.LineString(run)).max()
+    reach = max(BESIDE * snap, float(off)) + SAME_PLACE
+    barred = barred_edges(layout)
+    way = way_between(layout, a, b, costs_near(layout, run, reach, barred))
+    if way is not None:
+        return np.array(way, dtype=np.int64)
+    if way_between(layout, a, b, costs_near(layout, run, reach, barred[:0])) is not None:
+        raise EditError(AT_LAKE)
+    raise _NoWay(
+        "The line runs so close to a boundary that it can neither follow it nor keep clear of it: "
+        "draw it along the boundary, or farther off."
+    )

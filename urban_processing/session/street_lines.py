@@ -26,6 +26,12 @@ CROSSING = 4.0
 APPROACH = 2.0
 """A street comes to the boundary that it follows over so many times the snap distance."""
 
+AT_LAKE = (
+    "The line crosses a lake or another hole of the land, or follows its shore: no street can run "
+    "there."
+)
+"""Why a street is refused at a hole of the land."""
+
 
 @dataclass(frozen=True, eq=False)
 class Link:
@@ -158,7 +164,7 @@ def _outside(moment: Moment, line: DrawnLine, runs: list[FloatArray], all_of_it:
     ]
     middle = [shapely.Point(line.at(float(run.mean()))) for run in runs]
     if holes and all(shapely.intersects(holes, place).any() for place in middle):
-        return "The line crosses a lake or another hole of the land: no street can run there."
+        return AT_LAKE
     if all_of_it and not len(line.near(layout.mesh.xy[layout.mesh.origin.reshape(-1, 2)], 0.0)):
         return "The line does not touch the land."
     return "The line leaves the land: end it at the land's rim."

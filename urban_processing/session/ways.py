@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterable
 
 import numpy as np
+import shapely
 
 from urban_processing.errors import EditError
 from urban_processing.layout import EdgeKind, Layout, Steering
@@ -22,8 +23,9 @@ TURN_SHARE = 0.5
 AVOIDED = 3.0
 """How many times as long edges count on which a planner wants no street."""
 
-STRAY = 1.0
-"""How many times as long edges count further that are a snap distance off the drawn line."""
+STRAY = 2.0
+"""How many times as long edges count further that are as far off a drawn line
+as is allowed."""
 
 
 def cheapest(
@@ -184,24 +186,31 @@ class _CornerSearch:
         ]
 
 
-def costs_near(layout: Layout, off: FloatArray, snap: float, barred: IntArray) -> dict[int, float]:
+def costs_near(
+    layout: Layout, line: FloatArray, reach: float, barred: IntArray
+) -> dict[int, float]:
     """Costs of the edges near a line, those on it the least.
 
     Parameters
     ----------
     layout
         The layout.
-    off
-        (V,) distance of each vertex from the line in metres, infinite where it is far.
-    snap
-        Distance in metres within which edges are near.
+    line
+        (n, 2) vertices of the line.
+    reach
+        Distance in metres within which both ends and the middle of near edges are.
     barred
         Edges that are not to be followed.
     """
     mesh = layout.mesh
-    ends = off[mesh.origin.reshape(-1, 2)]
-    near = np.asarray((ends <= snap).all(axis=1))
+    low, high = line.min(axis=0) - reach, line.max(axis=0) + reach
+    ends = mesh.xy[mesh.origin.reshape(-1, 2)]
+    near = np.asarray(((ends >= low) & (ends <= high)).all(axis=(1, 2)))
     near[barred] = False
     edges = np.flatnonzero(near)
-    stray = 1.0 + STRAY * ends[edges].mean(axis=1) / snap
-    return dict(zip(edges.tolist(), (mesh.edge_length[edges] * stray).tolist(), strict=True))
+    places = np.stack([ends[edges, 0], ends[edges].mean(axis=1), ends[edges, 1]], axis=1)
+    off = shapely.distance(shapely.points(places), shapely.LineString(line))
+    stray = 1.0 + STRAY * off.mean(axis=1) / reach
+    cost = mesh.edge_length[edges] * stray
+    kept = (off <= reach).all(axis=1)
+    return dict(zip(edges[kept].tolist(), cost[kept].tolist(), strict=True))
