@@ -32,6 +32,8 @@ from qgis_plugin.texts import tr
 NAME = "UrbanProcessingSteering"
 """Name by which QGIS remembers where the dock stood."""
 
+_SCROLL_BAR = 18
+
 
 class SteeringDock(QgsDockWidget):
     """The dock: first what to begin with, then the session.
@@ -104,9 +106,9 @@ class SteeringDock(QgsDockWidget):
             area.setFrameShape(QScrollArea.Shape.NoFrame)
             area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
             area.setWidget(page)
+            area.setMinimumWidth(page.minimumSizeHint().width() + _SCROLL_BAR)
             self.pages.addWidget(area)
         self.setWidget(self.pages)
-        self.setMinimumWidth(340)
 
     def _connect(self) -> None:
         steering, panel = self.steering, self.panel

@@ -11,7 +11,7 @@ from qgis.core import QgsApplication, QgsCoordinateReferenceSystem
 from qgis.PyQt.QtCore import QObject, pyqtSignal
 
 from qgis_plugin import dependencies
-from qgis_plugin.crs import crs_of
+from qgis_plugin.crs_text import crs_of
 from qgis_plugin.feedback import in_qgis
 from qgis_plugin.steering.layers import SteeringLayers
 from qgis_plugin.steering.loading import load_layers

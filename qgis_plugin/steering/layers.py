@@ -20,7 +20,7 @@ from qgis.core import (
 )
 from qgis.PyQt.QtCore import QObject, pyqtSignal
 
-from qgis_plugin.crs import crs_of
+from qgis_plugin.crs_text import crs_of
 from qgis_plugin.steering.fields import parcel_columns, parcel_fields, street_columns, street_fields
 from qgis_plugin.steering.model import Difference
 from qgis_plugin.steering.style import style_parcels, style_streets
@@ -59,6 +59,8 @@ class SteeringLayers(QObject):
         group = QgsProject.instance().layerTreeRoot().insertGroup(0, tr("Steering"))
         self.streets.make(tr("Streets (steering)"), crs, group, style_streets)
         self.parcels.make(tr("Parcels (steering)"), crs, group, style_parcels)
+        for expanded in (False, True):  # the tree's view has closed it, without telling it
+            group.setExpanded(expanded)
 
     def remove(self) -> None:
         """Take the layers out of the project, and their group if nothing else is in it."""

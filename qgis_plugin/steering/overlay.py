@@ -17,6 +17,8 @@ _PLACES = tuple(i / 20 for i in range(2, 19))
 """Where along a line its badge may stand."""
 
 _PADDING = 4.0
+_ROOMY = 120.0
+"""Pixels that lines are long at least to carry scores as well as ranks."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +32,6 @@ class DrawnOption:
     def colour(self) -> QColor:
         """Colour of its rank."""
         return candidate_colour(self.option.rank)
-
-    @property
-    def label(self) -> str:
-        """What stands on its badge."""
-        return f"{self.option.rank} · {self.option.score:.2f}"
 
 
 def candidate_colour(rank: int) -> QColor:
@@ -116,12 +113,14 @@ class CandidateOverlay(QgsMapCanvasItem):
         font.setPointSizeF(9.5)
         font.setBold(True)
         painter.setFont(font)
+        roomy = min((path.length() for path in paths), default=0.0) >= _ROOMY
         taken: list[QRectF] = []
         for drawn, path in zip(self._drawn, paths, strict=True):
-            size = QFontMetricsF(font).boundingRect(drawn.label).size()
+            label = self._label(drawn, roomy=roomy)
+            size = QFontMetricsF(font).boundingRect(label).size()
             badge = _place(path, size.width() + 3 * _PADDING, size.height() + _PADDING, taken)
             taken.append(badge)
-            self._paint_badge(painter, drawn, badge)
+            self._paint_badge(painter, drawn, badge, label)
 
     def _paint_line(self, painter: QPainter, drawn: DrawnOption, path: QPainterPath) -> None:
         rank = drawn.option.rank
@@ -134,14 +133,23 @@ class CandidateOverlay(QgsMapCanvasItem):
         painter.setPen(_pen(drawn.colour, width, style))
         painter.drawPath(path)
 
-    def _paint_badge(self, painter: QPainter, drawn: DrawnOption, badge: QRectF) -> None:
+    def _label(self, drawn: DrawnOption, *, roomy: bool) -> str:
+        """What stands on a badge: without the score where there is little room."""
+        option = drawn.option
+        if not roomy and option.rank != self.highlighted:
+            return str(option.rank)
+        return f"{option.rank} · {option.score:.2f}"
+
+    def _paint_badge(
+        self, painter: QPainter, drawn: DrawnOption, badge: QRectF, label: str
+    ) -> None:
         strong = drawn.option.rank == self.highlighted
         radius = badge.height() / 2
         painter.setPen(QPen(drawn.colour, 1.6))
         painter.setBrush(QBrush(drawn.colour if strong else QColor(255, 255, 255, 240)))
         painter.drawRoundedRect(badge, radius, radius)
         painter.setPen(QPen(QColor("white") if strong else drawn.colour.darker(125)))
-        painter.drawText(badge, Qt.AlignmentFlag.AlignCenter, drawn.label)
+        painter.drawText(badge, Qt.AlignmentFlag.AlignCenter, label)
 
     def _path(self, line: QgsGeometry) -> QPainterPath:
         path = QPainterPath()

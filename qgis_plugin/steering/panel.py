@@ -30,7 +30,7 @@ from qgis_plugin.steering.widgets import Note, allow, button, tipped
 from qgis_plugin.texts import tr
 
 _USES = (PARK, "square", "school", "playground", "water")
-_TOOLS_IN_A_ROW = 3
+_TOOLS_IN_A_ROW = 2
 
 
 class SteeringPanel(QWidget):
@@ -172,9 +172,7 @@ class SteeringPanel(QWidget):
             tr("Finish the layout, and load parcels, streets and junctions as layers."),
             "mActionAddLayer",
         )
-        self.end = button(
-            tr("Close session"), tr("End the session, to begin another."), "mActionRemove"
-        )
+        self.end = button(tr("Close"), tr("Close the session, to begin another."), "mActionRemove")
 
     def _make_options(self) -> None:
         self.use = tipped(QComboBox(), tr("What the parcel is for; type another use if you like."))
@@ -201,6 +199,7 @@ class SteeringPanel(QWidget):
         for form in (use, street):
             form.setContentsMargins(0, 0, 0, 0)
         tools = QGridLayout()
+        tools.setSpacing(4)
         for i, made in enumerate(self.tools.values()):
             tools.addWidget(made, i // _TOOLS_IN_A_ROW, i % _TOOLS_IN_A_ROW)
         self._by_hand = _row(self.adopt, self.discard)

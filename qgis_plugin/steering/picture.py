@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 import numpy as np
 import shapely
 from qgis.core import QgsFeature, QgsFields, QgsGeometry
-from urban_processing.session.session import Session
 
 from qgis_plugin.steering.fields import DONE, LOCKED, TO_CUT, parcel_fields, street_fields
 from qgis_plugin.steering.model import Difference, StreetKey
 from urban_processing.layout import Layout, Stage
 from urban_processing.mesh.planar import BoolArray
+from urban_processing.session.session import Session
 from urban_processing.streets.network import street_network
 
 K = TypeVar("K")

@@ -7,7 +7,6 @@ from qgis.PyQt.QtXml import QDomDocument
 
 from qgis_plugin.steering.fields import DONE, LAND_USE, LOCKED, STATE, TO_CUT
 from qgis_plugin.texts import tr
-from urban_processing.layout_file.styles import layer_style
 from urban_processing.schema import STREETS
 
 PARK = "park"
@@ -43,6 +42,8 @@ def style_parcels(layer: QgsVectorLayer) -> None:
 
 def style_streets(layer: QgsVectorLayer) -> None:
     """Draw streets as the layers of results are drawn."""
+    from urban_processing.layout_file.styles import layer_style  # needs what the engine needs
+
     document = QDomDocument()
     document.setContent(layer_style(STREETS))
     layer.importNamedStyle(document, QgsMapLayer.StyleCategory.Symbology)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -165,6 +166,23 @@ def begun(table: Table, layer: Callable[..., Any]) -> Table:
     table.click(table.dock.start_panel.begin)
     assert table.view is not None, table.warnings
     return table
+
+
+def test_opening_the_dock_loads_neither_numpy_nor_shapely(plugins: Path) -> None:
+    """In the programs of QGIS their first import must go the plugin's own way."""
+    code = f"""
+import sys
+sys.path[:0] = [{str(plugins)!r}, "/usr/share/qgis/python/plugins"]
+import qgis.gui, qgis.PyQt.QtXml, processing.tools.dataobjects
+before = set(sys.modules)
+import urban_processing_qgis.dock
+new = {{name.partition(".")[0] for name in set(sys.modules) - before}}
+print(sorted(new & {{"numpy", "scipy", "shapely", "processing"}}))
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip().endswith("[]"), done.stdout + done.stderr
 
 
 def test_a_session_begins_with_the_land_as_one_parcel(begun: Table) -> None:
