@@ -12,6 +12,7 @@ from functools import cache, partial
 
 import gallery_parcels
 import gallery_real
+import gallery_steering
 import geopandas as gpd
 from gallery_drawing import COLUMN, IMAGES, SAMPLES, Panel, blank, figure, laid_out, sheet, write
 from matplotlib.figure import Figure
@@ -283,6 +284,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     **{f"strategies_{name}": partial(strategies, name) for name in STREETS},
     "last_levels": last_levels,
     "edits": edits,
+    **gallery_steering.PICTURES,
     **gallery_real.PICTURES,
     **gallery_parcels.PICTURES,
 }

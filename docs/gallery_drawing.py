@@ -7,13 +7,15 @@ import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
 import urban_processing as up
-from urban_processing.io.frames import GeoLayers, GeoLayout
+from urban_processing.io.frames import GeoLayout
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLES = ROOT / "sample_data"
@@ -30,7 +32,16 @@ COLOURS = 256
 
 MOST_BYTES = 250_000
 
-Panel = tuple[str, GeoLayout | GeoLayers]
+
+class Drawable(Protocol):
+    """What a panel shows."""
+
+    def plot(self, *, ax: Axes) -> object:
+        """Draw it into axes."""
+        ...
+
+
+Panel = tuple[str, Drawable]
 
 
 def laid_out(name: str, **parameters: object) -> GeoLayout:

@@ -15,6 +15,7 @@ from urban_processing.errors import BoundaryError, EditError
 from urban_processing.hashing import child, splitmix64, unmixed
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.layout import Layout, Stage, Steering
+from urban_processing.metrics import certificate
 from urban_processing.params import CogenerateParams
 from urban_processing.pipelines.cogenerate import cogenerate
 from urban_processing.session.lineage import descendants, merged, parents
@@ -147,6 +148,17 @@ def test_figures_agree_with_the_layout(session: Session) -> None:
     assert figures["unreached"] == 0
     inner = layout.edge_street & (layout.edge_kind == 0)
     assert figures["street_km"] == pytest.approx(layout.mesh.edge_length[inner].sum() / 1000)
+
+
+def test_the_session_of_the_samples_is_replayed(sample: Find) -> None:
+    land = sample("irregular_64ha")
+    session = Session.load(land.with_name("steering.json"), read_boundary(land))
+    assert session.is_complete
+    layout = session.layout
+    assert [layout.land_uses[use] for use in layout.face_use[layout.face_locked]] == ["park"]
+    assert len(layout.fixed_streets) == 3
+    assert certificate(layout).holds
+    assert session.figures()["street_ends"] == 0
 
 
 # candidates and choices

@@ -48,13 +48,13 @@ def test_two_streets_cross_on_the_land_parcel() -> None:
         follow=False,
         given=GivenStreet("collector", 16.0),
     )
-    assert said == "A street of 418 m was added; it cut parcel 1."
+    assert said == "A street of 418 m was added; it cut parcel 1"
     one = next_moment(start, with_streets(state))
     assert one.parcels == (2, 3)
     state, said = add_street(
         one, np.array([(150.0, 0.0), (180.0, 400.0)]), snap=5.0, follow=False, given=ANY
     )
-    assert said == "A street of 401 m was added; it cut parcels 2 and 3."
+    assert said == "A street of 401 m was added; it cut parcels 2 and 3"
     two = next_moment(one, with_streets(state))
     assert two.parcels == (4, 5, 6, 7)
     layout = two.state.layout
@@ -90,12 +90,10 @@ def test_street_follows_boundaries_within_snap() -> None:
     assert shapely.LineString([(0, y), (400, y)]).difference(inner.buffer(1e-6)).length < 1e-3
     line = [(0.0, y + 3), (100.0, y - 4), (210.0, y + 4), (300.0, y - 3), (400.0, y + 2)]
     state, said = add_street(moment, np.array(line), snap=6.0, follow=False, given=ANY)
-    assert said == "A street of 400 m was added."
+    assert said == "A street of 400 m was added"
     assert state.layout.mesh.n_faces == layout.mesh.n_faces
     own = streets_of(state.layout, state.layout.edge_fixed == 0)
-    assert own.equals(shapely.LineString([(0, y), (400, y)])) or own.hausdorff_distance(
-        shapely.LineString([(0, y), (400, y)])
-    ) == pytest.approx(0.0, abs=1e-6)
+    assert own.hausdorff_distance(shapely.LineString([(0, y), (400, y)])) < 1e-6
 
 
 def test_street_follows_then_cuts() -> None:
@@ -146,7 +144,7 @@ def test_street_runs_along_corners_by_the_shortest_way() -> None:
     assert state.layout.mesh is layout.mesh
     assert layout.mesh.edge_length[own].sum() == pytest.approx(300.0)
     new = own & ~layout.edge_street
-    assert said == f"A street of {layout.mesh.edge_length[new].sum():.0f} m was added."
+    assert said == f"A street of {layout.mesh.edge_length[new].sum():.0f} m was added"
     assert state.layout.steered(Steering.KEPT)[own].all()
 
 
@@ -168,7 +166,7 @@ def test_what_is_street_stays_and_remembers() -> None:
         later, np.array([(0.0, 200.0), (200.0, 200.0), (200.0, 0.0)]), snap=5.0, follow=False,
         given=ANY,
     )  # fmt: skip
-    assert said == "A street of 200 m was added; it cut parcel 3." or said.endswith("parcel 2.")
+    assert said == "A street of 200 m was added; it cut parcel 3"
     layout = state.layout
     assert set(layout.edge_level[layout.edge_fixed == 0].tolist()) == {0}
     assert set(layout.edge_level[layout.edge_fixed == 1].tolist()) == {3}
@@ -183,7 +181,7 @@ def test_what_is_street_stays_and_remembers() -> None:
         ([0.0, 50.0, 3.0], "list of points"),
         ([(0, 0), (400, 400), (400, 0), (0, 300)], "crosses itself"),
         ([(900, 900), (999, 999)], "does not touch the land"),
-        ([(0, 50), (500, 50)], "leaves the land: end it at the land's rim"),
+        ([(350, 30), (450, 50), (450, 80), (350, 90)], "leaves the land: end it at"),
         ([(0, 50), (100, 50)], "ends inside parcel 1: draw it on to"),
         ([(100, 50), (400, 50)], "begins inside parcel 1: draw it on to"),
         ([(0, 200), (400, 200)], "crosses a lake"),
@@ -196,6 +194,16 @@ def test_drawn_lines_refused(line: object, words: str) -> None:
     assert words in refusal(moment, line, snap=1.0)
 
 
+def test_what_is_drawn_beyond_the_rim_is_left_out() -> None:
+    moment = moment_of(SQUARE)
+    exact, _ = add_street(moment, np.array([(0, 50), (400, 50)]), snap=1.0, follow=False, given=ANY)
+    beyond, said = add_street(
+        moment, np.array([(-70, 50), (200, 50), (500, 50)]), snap=1.0, follow=False, given=ANY
+    )
+    assert said == "A street of 400 m was added; it cut parcel 1"
+    assert beyond.layout.digest == exact.layout.digest
+
+
 def test_small_halves_are_named() -> None:
     moment = moment_of(SQUARE)
     said = refusal(moment, [(0, 390), (30, 400)], snap=0.2)
@@ -204,8 +212,7 @@ def test_small_halves_are_named() -> None:
     )
     small = moment_of(shapely.box(0, 0, 40, 25))
     assert refusal(small, [(0, 12), (40, 12)], snap=0.2) == (
-        "The line would cut parcel 1. It has 1,000 m²; the smallest parcel allowed is 600 m²: "
-        "lead the line along boundaries there."
+        "Parcel 1 (1,000 m²) is too small to be cut in two: the smallest parcel allowed is 600 m²."
     )
 
 
@@ -240,18 +247,17 @@ def test_removed_street_does_not_come_back() -> None:
     moment = moment_of(SQUARE, levels=5)
     layout = moment.state.layout
     inner = np.flatnonzero(layout.edge_street & (layout.edge_kind == EdgeKind.INTERIOR))
-    tried, gone = 0, 0
+    gone = 0
     for edge in inner[:: max(len(inner) // 12, 1)].tolist():
         place = layout.mesh.xy[layout.mesh.origin[2 * edge : 2 * edge + 2]].mean(axis=0)
         state, said = remove_street(moment, place, reach=1.0)
         assert said.startswith("A street of ")
-        assert said.endswith(" m was removed.")
+        assert said.endswith(" m was removed")
         barred = state.layout.steered(Steering.NO_STREET)
         assert barred[edge]
         assert not state.layout.edge_street[barred].any()
         assert (state.layout.edge_level[barred] == -1).all()
         after = next_moment(moment, with_streets(state))
-        tried += 1
         try:
             check(moment, after)
         except EditError:
@@ -259,13 +265,13 @@ def test_removed_street_does_not_come_back() -> None:
         gone += 1
         assert not after.state.layout.edge_street[edge]
         assert not len(unreached_parcels_of(after.state.layout))
-    assert tried > gone // 2 > 0
+    assert gone > 0
 
 
 def test_removal_goes_from_junction_to_junction() -> None:
     moment = drawn(drawn(moment_of(SQUARE), [(0, 100), (400, 100)]), [(150, 0), (150, 400)])
     state, said = remove_street(moment, np.array([300.0, 101.0]), reach=2.0)
-    assert said == "A street of 250 m was removed."
+    assert said == "A street of 250 m was removed"
     gone = state.layout.steered(Steering.NO_STREET)
     assert streets_of(state.layout, gone).equals(shapely.LineString([(150, 100), (400, 100)]))
     assert (state.layout.edge_fixed[gone] == NOT_FIXED).all()
@@ -334,12 +340,10 @@ def test_cuts_of_neighbours_meet() -> None:
 
 def test_cuts_refused() -> None:
     moment = moment_of(LANDS["ell"], min_area=400)
-    comb = [(0, 500), (500, 500), (500, 290), (290, 310), (100, 590)]
     for line, words in (
         ([(700, 0), (700, 300)], "The line does not cross parcel 1."),
         ([(0, 100), (100, 100)], "ends inside parcel 1"),
         ([(-10, 500), (310, 500), (310, 350), (-10, 350)], "crosses parcel 1 2 times"),
-        (comb, "crosses itself|crosses parcel 1|ends inside"),
     ):
         with pytest.raises(EditError, match=words):
             path_across(moment, 0, line, snap=1.0)

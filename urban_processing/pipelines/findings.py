@@ -41,11 +41,12 @@ def _count(layout: Layout, params: CogenerateParams) -> list[Issue]:
     wanted, found = params.parcels, layout.mesh.n_faces
     if wanted is None or abs(found - wanted) <= COUNT_TOLERANCE * wanted:
         return []
-    reason = (
-        f"the land has {len(np.unique(layout.face_part))} parts, and each is at least one parcel."
-        if found > wanted
-        else "some parcels could not be cut any further."
-    )
+    if found > wanted:
+        reason = f"the land has {len(np.unique(layout.face_part))} parts, each at least a parcel."
+    elif layout.face_locked.any():
+        reason = "parcels that are kept as they are have their share of the land."
+    else:
+        reason = "some parcels could not be cut any further."
     return [
         Issue(
             code="count_missed",

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection
 from matplotlib.colors import LogNorm
@@ -23,11 +24,13 @@ from urban_processing.report.palette import (
     FIXED_STREET,
     INK,
     IRREGULAR_RAMP,
+    KEPT,
     OBSTACLE,
     PARCEL,
     SURFACE,
     TRIANGLE,
     Scale,
+    is_kept,
 )
 from urban_processing.tables import Table
 
@@ -36,6 +39,9 @@ LEGEND_SHARE = 0.74
 
 LETTER_WIDTH, LETTERS_PER_SWATCH = 0.55, 5
 """Mean width of a letter in sizes of the type; letters' worth of a swatch and the space beside."""
+
+MOST_USES = 3
+"""So many land uses are named in a legend; more are counted."""
 
 POINTS_PER_INCH = 72.0
 
@@ -130,14 +136,22 @@ def legend_entries(
 
 def parcel_entries(parcels: Table) -> list[Patch]:
     """Return the entries for parcels in the colours of `parcel_colours`."""
-    triangle = parcels["sides"] == 3
-    irregular = (parcels["irregularity"] > IRREGULAR) & ~triangle
-    entries = [swatch(PARCEL, _counted(len(parcels), "parcel"))]
+    kept = is_kept(parcels)
+    triangle = (parcels["sides"] == 3) & ~kept
+    irregular = (parcels["irregularity"] > IRREGULAR) & ~triangle & ~kept
+    entries = [swatch(PARCEL, _counted(len(parcels) - int(kept.sum()), "parcel"))]
+    if kept.any():
+        entries.append(swatch(KEPT, _kept_in_words(parcels["land_use"][kept])))
     if irregular.any():
         entries.append(swatch(IRREGULAR_RAMP(0.6), f"{int(irregular.sum()):,} irregular"))
     if triangle.any():
         entries.append(swatch(TRIANGLE, _counted(int(triangle.sum()), "triangle")))
     return entries
+
+
+def _kept_in_words(uses: npt.NDArray[np.object_]) -> str:
+    names = sorted(set(uses.tolist()))
+    return ", ".join(names) if len(names) <= MOST_USES else f"{len(names)} other uses"
 
 
 def _counted(number: int, noun: str) -> str:

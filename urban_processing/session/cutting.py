@@ -18,36 +18,13 @@ from urban_processing.pipelines.levels import State
 from urban_processing.quotas import divided
 from urban_processing.session.drawn_line import SAME_PLACE, as_line, as_points
 from urban_processing.session.moment import Moment
+from urban_processing.session.spots import Spot, spot_on, with_vertices
 from urban_processing.session.wording import areas_named, parcels_named
 from urban_processing.site import AREA_ROUNDING, snap_to_grid
 from urban_processing.subdivision.insert import (
     LEAST_CLEARANCE,
     PATH_TOLERANCE,
-    TEE_SNAP,
-    VERTEX_SNAP,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Spot:
-    """A place on boundaries: a vertex, or a point of an edge that is to become one.
-
-    Parameters
-    ----------
-    vertex
-        The vertex; -1 where there is none yet.
-    edge
-        The edge that the place is on.
-    xy
-        (2,) the place.
-    reach
-        Other new vertices of the edge within so many metres are the same.
-    """
-
-    vertex: int
-    edge: int
-    xy: FloatArray
-    reach: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +69,14 @@ def cut_faces(moment: Moment, paths: Mapping[int, FloatArray]) -> State:
     check_can_be_cut(moment, list(paths))
     check_large_enough(moment, list(paths))
     layout = moment.state.layout
-    places = [(face, tuple(path[end].tolist())) for face, path in paths.items() for end in (0, -1)]
-    faces_at: dict[tuple[float, ...], list[int]] = {}
-    for face, place in places:
-        faces_at.setdefault(place, []).append(face)
-    spots = [_shared_spot(layout, faces_at[place], face, np.array(place)) for face, place in places]
+    ends = [(face, path[end]) for face, path in paths.items() for end in (0, -1)]
+    # paths of neighbours that meet must have one vertex there
+    spots = [
+        _shared_spot(
+            layout, [f for f, other in ends if math.dist(other, place) <= SAME_PLACE], face, place
+        )
+        for face, place in ends
+    ]
     cut, vertices = with_vertices(layout, spots)
     scale = np.sqrt(layout.mesh.face_area)
     joints = [
@@ -135,7 +115,8 @@ def path_across(moment: Moment, face: int, line: object, *, snap: float) -> Floa
     h = mesh.face_half_edges(face)
     ring = np.stack([mesh.xy[mesh.origin[h]], mesh.xy[mesh.target[h]]], axis=1)
     parcel = shapely.Polygon(ring[:, 0])
-    at = drawn.crossings(ring, beyond=snap)
+    at, _ = drawn.crossings(ring, beyond=snap)
+    at = at[np.diff(at, prepend=-np.inf) > SAME_PLACE]
     stops = at[(at >= -SAME_PLACE) & (at <= drawn.length + SAME_PLACE)]
     # an end inside the parcel goes on to its boundary, if that is near
     if _is_within(parcel, drawn.xy[0]):
@@ -194,53 +175,13 @@ def check_large_enough(moment: Moment, faces: Sequence[int]) -> None:
     small = [f for f in dict.fromkeys(faces) if area[f] < 2.0 * least * (1.0 - AREA_ROUNDING)]
     if not small:
         return
-    numbers = [moment.number(face) for face in small]
-    sizes = f"It has {area[small[0]]:,.0f} m²" if len(small) == 1 else "They are too small"
+    named = parcels_named(moment.number(face) for face in small)
+    too = "is too small" if len(small) == 1 else "are too small"
+    size = f" ({area[small[0]]:,.0f} m²)" if len(small) == 1 else ""
     raise EditError(
-        f"The line would cut {parcels_named(numbers)}. {sizes}; the smallest parcel allowed is "
-        f"{least:,.0f} m²: lead the line along boundaries there."
+        f"{named[0].upper()}{named[1:]}{size} {too} to be cut in two: the smallest parcel "
+        f"allowed is {least:,.0f} m²."
     )
-
-
-def spot_on(
-    layout: Layout, half_edges: IntArray, place: FloatArray, *, reach: float, among: IntArray
-) -> Spot:
-    """Where some edges are nearest to a place: a vertex close by, or a point of an edge.
-
-    Parameters
-    ----------
-    layout
-        The layout.
-    half_edges
-        The edges, such as those around a parcel.
-    place
-        (2,) local coordinates.
-    reach
-        Parcel corners within so many metres are taken; nearer ones are in any case, and so are
-        other vertices if they are very near.
-    among
-        Vertices that may be taken.
-    """
-    mesh = layout.mesh
-    a, b = mesh.xy[mesh.origin[half_edges]], mesh.xy[mesh.target[half_edges]]
-    edge = b - a
-    along = np.clip(((place - a) * edge).sum(axis=1) / (edge**2).sum(axis=1), 0.0, 1.0)
-    feet = a + along[:, None] * edge
-    off = np.round(np.hypot(*(feet - place).T), 9)
-    k = int(np.lexsort((feet[:, 1], feet[:, 0], off))[0])
-    foot, h = feet[k], int(half_edges[k])
-    sides = mesh.face.reshape(-1, 2)[h >> 1]
-    # not that of the parcel: what is far for the smallest one, somebody may have meant
-    scale = math.sqrt(min(float(mesh.face_area[sides[sides >= 0]].min()), 2.0 * layout.min_area))
-    far = np.round(np.hypot(*(mesh.xy[among] - foot).T), 9)
-    node = (mesh.valence[among] > 2) | layout.vertex_corner[among]
-    near = far <= np.where(node, max(reach, TEE_SNAP * scale), VERTEX_SNAP * scale)
-    if near.any():
-        own, far = among[near], far[near]
-        x, y = mesh.xy[own].T
-        vertex = int(own[np.lexsort((y, x, far))[0]])
-        return Spot(vertex, h >> 1, mesh.xy[vertex], 0.0)
-    return Spot(-1, h >> 1, foot, VERTEX_SNAP * scale)
 
 
 def _shared_spot(layout: Layout, faces: Sequence[int], face: int, place: FloatArray) -> Spot:
@@ -251,42 +192,6 @@ def _shared_spot(layout: Layout, faces: Sequence[int], face: int, place: FloatAr
     for other in faces:
         vertices = np.intersect1d(vertices, mesh.origin[mesh.face_half_edges(other)])
     return spot_on(layout, ring, place, reach=0.0, among=vertices)
-
-
-def with_vertices(layout: Layout, spots: Sequence[Spot]) -> tuple[Layout, list[int]]:
-    """The layout with a vertex at each spot, and the vertices.
-
-    Vertices and edges keep their numbers; what is new comes after them.
-    """
-    if all(spot.vertex >= 0 for spot in spots):
-        return layout, [spot.vertex for spot in spots]
-    editor = MeshEditor(layout.mesh)
-    on_edge: dict[int, list[int]] = {}
-    vertices = []
-    for spot in spots:
-        vertex = spot.vertex
-        if vertex < 0:
-            made = on_edge.setdefault(spot.edge, [])
-            x, y = spot.xy.tolist()
-            near = [v for v in made if math.dist((editor.x[v], editor.y[v]), (x, y)) <= spot.reach]
-            vertex = near[0] if near else _split(editor, layout, spot)
-            made.append(vertex)
-        vertices.append(vertex)
-    return layout.with_mesh(*editor.commit()), vertices
-
-
-def _split(editor: MeshEditor, layout: Layout, spot: Spot) -> int:
-    """Put a vertex on an edge, which others may have split already."""
-    first, last = layout.mesh.origin[2 * spot.edge : 2 * spot.edge + 2].tolist()
-    x, y = spot.xy.tolist()
-    start = editor.x[first], editor.y[first]
-    reach = math.dist(start, (x, y))
-    h = 2 * spot.edge
-    while True:
-        end = editor.origin[h ^ 1]
-        if end == last or math.dist(start, (editor.x[end], editor.y[end])) >= reach:
-            return editor.origin[editor.split_edge(h, x, y)]
-        h = editor.next[h]
 
 
 def joined(moment: Moment, layout: Layout, joints: Sequence[Joint]) -> tuple[State, IntArray]:
@@ -317,7 +222,9 @@ def joined(moment: Moment, layout: Layout, joints: Sequence[Joint]) -> tuple[Sta
     left = list(joints)
     while left:
         layout, owner, left = _one_each(moment, layout, owner, left)
-    quota = divided(before.layout.face_quota, owner, layout.mesh.face_area)
+    quota = layout.face_quota.copy()
+    halves = np.flatnonzero(np.bincount(owner)[owner] > 1)
+    quota[halves] = divided(before.layout.face_quota, owner[halves], layout.mesh.face_area[halves])
     new = np.arange(n_old, layout.mesh.n_edges)
     steering = layout.edge_steering.copy()
     steering[new] |= np.uint8(Steering.KEPT)

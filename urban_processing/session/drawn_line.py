@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,9 +46,14 @@ class DrawnLine:
 
     def at(self, s: float) -> FloatArray:
         """(2,) the place at a length along the line; beyond its ends, straight on."""
-        k = int(np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2))
+        lengths = self._lengths
+        k = min(max(bisect.bisect_right(lengths, s) - 1, 0), len(lengths) - 2)
         a, b = self.xy[k], self.xy[k + 1]
-        return np.asarray(a + (s - self.s[k]) / (self.s[k + 1] - self.s[k]) * (b - a))
+        return np.asarray(a + (s - lengths[k]) / (lengths[k + 1] - lengths[k]) * (b - a))
+
+    @cached_property
+    def _lengths(self) -> list[float]:
+        return [float(s) for s in self.s]
 
     def between(self, start: float, stop: float) -> FloatArray:
         """(m, 2) vertices strictly between two lengths along the line."""
@@ -74,8 +80,8 @@ class DrawnLine:
         met = first <= last
         return _merged(np.column_stack([first, last])[met] + self.s[row[met], None])
 
-    def crossings(self, segments: FloatArray, *, beyond: float = 0.0) -> FloatArray:
-        """Lengths along the line, in order, at which it crosses some segments.
+    def crossings(self, segments: FloatArray, *, beyond: float) -> tuple[FloatArray, IntArray]:
+        """Lengths along the line, in order, at which it crosses segments; and which segment.
 
         Both ends are prolonged straight by `beyond` metres; lengths there are negative, or more
         than that of the line.
@@ -89,11 +95,14 @@ class DrawnLine:
         e = segments[other, 1] - u
         across = _cross(d, e)
         slant = np.abs(across) > PARALLEL * np.hypot(*d.T) * np.hypot(*e.T)
-        a, d, u, e, across, row = (v[slant] for v in (a, d, u, e, across, row))
+        a, d, u, e, across = (v[slant] for v in (a, d, u, e, across))
+        row, other = row[slant], other[slant]
         t, w = _cross(u - a, e) / across, _cross(u - a, d) / across
         met = (np.minimum(t, w) >= -AT_END) & (np.maximum(t, w) <= 1.0 + AT_END)
-        found = np.sort(s[row[met]] + np.clip(t[met], 0.0, 1.0) * (s[row[met] + 1] - s[row[met]]))
-        return found[np.diff(found, prepend=-np.inf) > SAME_PLACE]
+        row, other = row[met], other[met]
+        found = s[row] + np.clip(t[met], 0.0, 1.0) * (s[row + 1] - s[row])
+        order = np.argsort(found, kind="stable")
+        return found[order], other[order]
 
     def _boxes_meet(self, segments: FloatArray, distance: float) -> tuple[IntArray, IntArray]:
         """Pairs of a piece of the line and a segment whose boxes are within a distance."""

@@ -12,7 +12,7 @@ from urban_processing.mesh.planar import FloatArray
 from urban_processing.session.moment import Moment
 from urban_processing.session.reading import Place
 
-SNAP_SHARE, LEAST_SNAP = 0.02, 0.05
+SNAP_SHARE, LEAST_SNAP = 0.1, 0.05
 """A drawn line lies on a boundary within this share of the side of a parcel of the smallest area,
 and within `LEAST_SNAP` metres at least."""
 

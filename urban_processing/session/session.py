@@ -66,6 +66,7 @@ class Session:
         self._start = start
         self._timeline = Timeline.beginning(first_moment(state), start.sentence)
         self._candidates: tuple[Moment, dict[int, tuple[Candidate, ...]]] | None = None
+        self._shown: tuple[Moment, int, Layout] | None = None
 
     @classmethod
     def begin(cls, site: Site, params: CogenerateParams) -> Self:
@@ -112,7 +113,13 @@ class Session:
     @property
     def layout(self) -> Layout:
         """Parcels and streets as they are now, with what was done in its provenance."""
-        state = self._moment.state
+        moment, now = self._moment, self._timeline.now
+        if self._shown is None or self._shown[0] is not moment or self._shown[1] != now:
+            self._shown = moment, now, self._told(moment.state)
+        return self._shown[2]
+
+    def _told(self, state: State) -> Layout:
+        """The layout of a state with the edits in its provenance."""
         if not self.edits:
             return state.layout
         entry = Step(

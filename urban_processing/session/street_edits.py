@@ -17,11 +17,18 @@ from urban_processing.session.cutting import (
     check_large_enough,
     joined,
     thinned,
-    with_vertices,
 )
 from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine, as_line, as_points
 from urban_processing.session.moment import Moment
-from urban_processing.session.street_lines import AT_LAKE, Link, Plan, barred_edges, plan_street
+from urban_processing.session.spots import with_vertices
+from urban_processing.session.street_lines import (
+    AT_LAKE,
+    Link,
+    Plan,
+    barred_edges,
+    ending_at_rims,
+    plan_street,
+)
 from urban_processing.session.ways import costs_near, way_along_corners, way_between
 from urban_processing.session.wording import parcels_named
 from urban_processing.streets.network import street_network
@@ -67,7 +74,8 @@ def add_street(
     Returns
     -------
     state, sentence
-        The state with the street, and what was done. Parcels are not reached anew yet.
+        The state with the street, and what was done, without a full stop. Parcels are not reached
+        anew yet.
 
     Raises
     ------
@@ -80,7 +88,7 @@ def add_street(
         cut: list[int] = []
         edges = way_along_corners(state.layout, as_points(line), reach=snap)
     else:
-        drawn = as_line(line, tolerance=THINNED * snap)
+        drawn = ending_at_rims(state.layout, as_line(line, tolerance=THINNED * snap))
         state, edges, cut = _drawn_street(moment, drawn, snap)
     layout = state.layout
     new = edges[~layout.edge_street[edges]]
@@ -88,7 +96,7 @@ def add_street(
         raise EditError("There is a street already along all of this line.")
     length = float(layout.mesh.edge_length[new].sum())
     sentence = f"A street of {length:,.0f} m was added"
-    sentence += f"; it cut {parcels_named(moment.number(f) for f in cut)}." if cut else "."
+    sentence += f"; it cut {parcels_named(moment.number(f) for f in cut)}" if cut else ""
     layout = _as_street(layout, edges, state.level, given)
     return dataclasses.replace(state, layout=layout), sentence
 
@@ -110,7 +118,8 @@ def remove_street(moment: Moment, place: FloatArray, *, reach: float) -> tuple[S
     Returns
     -------
     state, sentence
-        The state without the street, and what was done. Parcels are not reached anew yet.
+        The state without the street, and what was done, without a full stop. Parcels are not
+        reached anew yet.
 
     Raises
     ------
@@ -135,7 +144,7 @@ def remove_street(moment: Moment, place: FloatArray, *, reach: float) -> tuple[S
     )
     length = float(layout.mesh.edge_length[run].sum())
     state = dataclasses.replace(moment.state, layout=layout)
-    return state, f"A street of {length:,.0f} m was removed."
+    return state, f"A street of {length:,.0f} m was removed"
 
 
 def _as_street(layout: Layout, edges: IntArray, level: int, given: GivenStreet) -> Layout:

@@ -15,10 +15,11 @@ import shapely
 
 from urban_processing.errors import EditError
 from urban_processing.layout import EdgeKind, Layout
-from urban_processing.mesh.planar import FloatArray, IntArray
-from urban_processing.session.cutting import Spot, check_can_be_cut, spot_on
+from urban_processing.mesh.planar import OUTSIDE, FloatArray, IntArray, linear_rings
+from urban_processing.session.cutting import check_can_be_cut
 from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine
 from urban_processing.session.moment import Moment
+from urban_processing.session.spots import Spot, spot_on
 
 CROSSING = 4.0
 """A run near boundaries is a crossing if it is shorter than so many times the snap distance."""
@@ -170,6 +171,26 @@ def _outside(moment: Moment, line: DrawnLine, runs: list[FloatArray], all_of_it:
     return "The line leaves the land: end it at the land's rim."
 
 
+def ending_at_rims(layout: Layout, line: DrawnLine) -> DrawnLine:
+    """The line without what is drawn beyond the land's outer rim at either end."""
+    mesh, loops = layout.mesh, layout.mesh.loops
+    rims = np.flatnonzero((loops.face == OUTSIDE) & (mesh.loop_area < 0)).tolist()
+    half_edges = np.concatenate([loops.ring(rim) for rim in rims])
+    xy = mesh.xy[mesh.origin[half_edges]]
+    land = shapely.polygons(linear_rings(xy, np.cumsum([0, *(len(loops.ring(r)) for r in rims)])))
+    ends = shapely.points(line.xy[[0, -1]])[:, None]
+    beyond = ~shapely.dwithin(land, ends, SAME_PLACE).any(axis=1)
+    segments = np.stack([xy, mesh.xy[mesh.target[half_edges]]], axis=1)
+    at, _ = line.crossings(segments, beyond=0.0)
+    if not len(at) or not beyond.any():
+        return line
+    start = float(at[0]) if beyond[0] else 0.0
+    stop = float(at[-1]) if beyond[1] else line.length
+    if stop - start <= SAME_PLACE:
+        return line
+    return DrawnLine(np.vstack([line.at(start), line.between(start, stop), line.at(stop)]))
+
+
 class _Planner:
     """The layout, the line, and the distances within which it is snapped."""
 
@@ -183,6 +204,8 @@ class _Planner:
     ) -> None:
         self.layout, self.line, self.segments = layout, line, segments
         self.snap, self.end_snap = snap, end_snap
+        self.crossed, edge = line.crossings(segments, beyond=end_snap)
+        self.sides = layout.mesh.face.reshape(-1, 2)[edge]
 
     def meet(self, before: int | None, after: int | None, start: float, stop: float) -> list[Spot]:
         """The spots of a near run: one where it is a crossing, else where it comes and leaves.
@@ -191,10 +214,12 @@ class _Planner:
         """
         snap = self.end_snap if before is None or after is None else self.snap
         short = stop - start <= CROSSING * snap
-        if before is None and after is None:
-            return [self._end(0.0), self._end(self.line.length)]
-        if before is None or after is None:
-            return self._at_end(before, after, start, stop, short=short)
+        if before is None:
+            if after is None:
+                return [self._end(0.0), self._end(self.line.length)]
+            return self._at_beginning(after, start, stop, short=short)
+        if after is None:
+            return self._at_end(before, start, stop, short=short)
         if short:
             spot = self._shared(before, after, start, stop)
             if spot is not None:
@@ -203,14 +228,13 @@ class _Planner:
         leave = self._on_ring(after, self._touch(after, stop, start))
         return [come, leave]
 
-    def _at_end(
-        self, before: int | None, after: int | None, start: float, stop: float, *, short: bool
-    ) -> list[Spot]:
-        """The spots of the first or the last near run of the line."""
-        if after is not None:
-            leave = self._on_ring(after, self._touch(after, stop, start))
-            return [leave] if short else [self._end(0.0), leave]
-        assert before is not None
+    def _at_beginning(self, after: int, start: float, stop: float, *, short: bool) -> list[Spot]:
+        """The spots of the first near run of the line."""
+        leave = self._on_ring(after, self._touch(after, stop, start))
+        return [leave] if short else [self._end(0.0), leave]
+
+    def _at_end(self, before: int, start: float, stop: float, *, short: bool) -> list[Spot]:
+        """The spots of the last near run of the line."""
         come = self._on_ring(before, self._touch(before, start, stop))
         return [come] if short else [come, self._end(self.line.length)]
 
@@ -244,8 +268,7 @@ class _Planner:
         """
         sign = 1.0 if stop >= start else -1.0
         snap = max(self.snap, self.end_snap if stop in (0.0, self.line.length) else 0.0)
-        h = self.layout.mesh.face_half_edges(face)
-        at = self.line.crossings(self.segments[h >> 1], beyond=snap)
+        at = self.crossed[(self.sides == face).any(axis=1)]
         ahead = sign * (at - start)
         ahead = ahead[(ahead >= -SAME_PLACE)]
         room = abs(stop - start)
