@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsApplication, QgsCoordinateReferenceSystem
-from qgis.PyQt.QtCore import QObject, pyqtSignal
+from qgis.PyQt.QtCore import QObject, QTimer, pyqtSignal
 
 from qgis_plugin import dependencies
 from qgis_plugin.crs_text import crs_of
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from qgis_plugin.steering.bench import Bench
 
 _HOVER = "hover"
+_DONE = object()
 
 
 class Steering(QObject):
@@ -63,6 +64,8 @@ class Steering(QObject):
         self.unsaved = False
         self._bench: Bench | None = None
         self._job: Job | None = None
+        self._changes: Iterator[None] | None = None
+        self._context: Any = None
         self.doing = ""
         """What is being done, in words."""
 
@@ -71,7 +74,7 @@ class Steering(QObject):
     @property
     def is_busy(self) -> bool:
         """Whether something is being done that nothing else may be done beside."""
-        return self._job is not None
+        return self._job is not None or self._changes is not None
 
     @property
     def can_cancel(self) -> bool:
@@ -104,13 +107,14 @@ class Steering(QObject):
     def end(self) -> None:
         """Forget the session and its layers."""
         self._bench, self.view, self.unsaved = None, None, False
+        self._changes = None
         self.layers.remove()
         self.ended.emit()
 
     def close(self) -> None:
         """Stop the thread, and take the layers away."""
         self.worker.close()
-        self._job = None
+        self._job = self._changes = None
         self.layers.remove()
         for owned in (self.layers, self.worker):
             owned.deleteLater()
@@ -258,9 +262,12 @@ class Steering(QObject):
 
         def done(result: tuple[View, Any]) -> None:
             view, context = result
-            self._show(view)
-            load_layers(context)
-            self.told.emit(tr("The finished layout was loaded as layers."))
+
+            def load() -> None:
+                load_layers(context)
+                self.told.emit(tr("The finished layout was loaded as layers."))
+
+            self._show(view, load)
 
         self._with_bench(work, done, tr("The layout is finished…"), cancellable=True)
 
@@ -272,6 +279,7 @@ class Steering(QObject):
         algorithm, context = self._algorithm(), createContext()
         if algorithm is None:
             return
+        self._context = context  # has objects of Qt, which must not die on the thread
 
         def work(progress: Progress) -> tuple[Bench, View]:
             dependencies.require_engine()
@@ -341,6 +349,8 @@ class Steering(QObject):
         cancellable: bool,
     ) -> None:
         if self.is_busy:
+            if self.can_cancel:
+                self.refused.emit([self.why_not()])
             return
 
         def after(call: Callable[[Any], None], result: Any) -> None:
@@ -360,14 +370,27 @@ class Steering(QObject):
         self.worker.ask(self._job)
         self.state_changed.emit()
 
-    def _show(self, view: View) -> None:
-        """Have layers and window show what there is to see."""
+    def _show(self, view: View, then: Callable[[], None] | None = None) -> None:
+        """Have layers and window show what there is to see, then go on with something."""
         self.view = view
         if view.difference.whole and not self.layers.are_there:
             self.layers.make(view.crs)
-        self.layers.show(view.difference)
-        self.viewed.emit(view)
-        self.show_layers()  # if somebody took them out of the project
+        changes = self._changes = self.layers.changes(view.difference)
+
+        def go_on() -> None:
+            if self._changes is not changes:
+                return  # the session was ended meanwhile
+            if next(changes, _DONE) is not _DONE:
+                QTimer.singleShot(0, go_on)
+                return
+            self._changes = None
+            self.viewed.emit(view)
+            self.state_changed.emit()
+            if then is not None:
+                then()
+            self.show_layers()  # if somebody took them out of the project
+
+        go_on()
 
     def _refuse(self, error: UrbanError) -> None:
         if isinstance(error, Cancelled):

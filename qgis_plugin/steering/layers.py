@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+import itertools
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from math import inf
-from typing import Any
+from typing import Any, TypeVar
 
 from qgis.core import (
     QgsFeature,
@@ -26,6 +27,11 @@ from qgis_plugin.steering.model import Difference
 from qgis_plugin.steering.style import style_parcels, style_streets
 from qgis_plugin.texts import tr
 from urban_processing.schema import Column
+
+_AT_ONCE = 400
+"""Number of features that are changed before the window gets its turn."""
+
+T = TypeVar("T")
 
 
 class SteeringLayers(QObject):
@@ -67,11 +73,13 @@ class SteeringLayers(QObject):
         for shown in self._both:
             shown.remove()
 
-    def show(self, difference: Difference) -> None:
-        """Change the features that differ."""
+    def changes(self, difference: Difference) -> Iterator[None]:
+        """Change the features that differ, some at a time: the window lives between them."""
         whole = difference.whole
-        self.parcels.change(difference.parcels_gone, difference.parcels, whole=whole)
-        self.streets.change(difference.streets_gone, difference.streets, whole=whole)
+        yield from self.parcels.changes(difference.parcels_gone, difference.parcels, whole=whole)
+        yield from self.streets.changes(difference.streets_gone, difference.streets, whole=whole)
+        for shown in self._both:
+            shown.redraw()
 
     def undo_hand_edits(self) -> None:
         """Leave the layers' edit mode without keeping anything."""
@@ -138,26 +146,42 @@ class _ShownLayer:
         if group is not None and group.parent() is not None and not group.children():
             group.parent().removeChildNode(group)
 
-    def change(
+    def changes(
         self, gone: Iterable[Hashable], come: Mapping[Any, QgsFeature], *, whole: bool
-    ) -> None:
+    ) -> Iterator[None]:
+        if whole:
+            self._empty()
+        else:
+            for keys in _portions(gone):
+                self._delete(keys)
+                yield
+        for items in _portions(come.items()):
+            self._add(dict(items))
+            yield
+
+    def redraw(self) -> None:
+        if self.layer is not None:
+            self.layer.updateExtents()
+            self.layer.triggerRepaint()
+
+    def _empty(self) -> None:
+        if self.layer is not None:
+            self.layer.dataProvider().truncate()
+        self._ids, self._touched = {}, False
+
+    def _delete(self, keys: Iterable[Hashable]) -> None:
+        ids = [self._ids.pop(key) for key in keys if key in self._ids]
+        if self.layer is not None and ids:
+            self.layer.dataProvider().deleteFeatures(ids)
+
+    def _add(self, features: Mapping[Any, QgsFeature]) -> None:
         if self.layer is None:
             return
         provider = self.layer.dataProvider()
-        if whole:
-            provider.truncate()
-            self._ids, self._touched = {}, False
-        else:
-            ids = [self._ids.pop(key) for key in gone if key in self._ids]
-            if ids:
-                provider.deleteFeatures(ids)
-        if come:
-            done, added = provider.addFeatures(list(come.values()), QgsFeatureSink.Flag.FastInsert)
-            if not done:
-                raise OSError(f"The layer {self.layer.name()} could not be changed.")
-            self._ids.update(zip(come, (feature.id() for feature in added), strict=True))
-        self.layer.updateExtents()
-        self.layer.triggerRepaint()
+        done, added = provider.addFeatures(list(features.values()), QgsFeatureSink.Flag.FastInsert)
+        if not done:
+            raise OSError(f"The layer {self.layer.name()} could not be changed.")
+        self._ids.update(zip(features, (feature.id() for feature in added), strict=True))
 
     def roll_back(self) -> None:
         if self.layer is not None and self.layer.isEditable():
@@ -212,3 +236,9 @@ class _ShownLayer:
 
     def _drop(self) -> None:
         self.layer, self._ids, self._touched = None, {}, False
+
+
+def _portions(items: Iterable[T]) -> Iterator[list[T]]:
+    left = iter(items)
+    while some := list(itertools.islice(left, _AT_ONCE)):
+        yield some

@@ -13,7 +13,15 @@ from qgis.core import (
     QgsProject,
     QgsWkbTypes,
 )
-from qgis.gui import QgsMapCanvas, QgsMapMouseEvent, QgsMapTool, QgsRubberBand, QgsVertexMarker
+from qgis.gui import (
+    QgsMapCanvas,
+    QgsMapCanvasItem,
+    QgsMapMouseEvent,
+    QgsMapTool,
+    QgsRubberBand,
+    QgsVertexMarker,
+)
+from qgis.PyQt import sip
 from qgis.PyQt.QtCore import Qt, QTimer
 from qgis.PyQt.QtGui import QColor, QKeyEvent
 
@@ -84,7 +92,7 @@ class SteeringTool(QgsMapTool):
         if self.isActive():
             self.map.unsetMapTool(self)
         self.map.destinationCrsChanged.disconnect(self.reset)
-        self.map.scene().removeItem(self.outline)
+        remove_item(self.map, self.outline)
         self.deleteLater()
 
     def reset(self) -> None:
@@ -203,7 +211,7 @@ class StreetTool(PointTool):
 
     def dispose(self) -> None:
         """Take away what the tool has on the map, for good."""
-        self.map.scene().removeItem(self.line)
+        remove_item(self.map, self.line)
         super().dispose()
 
 
@@ -264,7 +272,7 @@ class ChooseTool(SteeringTool):
     def dispose(self) -> None:
         """Take away what the tool has on the map, for good."""
         super().dispose()
-        self.map.scene().removeItem(self.overlay)
+        remove_item(self.map, self.overlay)
 
     def _is_under(self, point: QgsPointXY) -> bool:
         place = self.place(point)
@@ -329,7 +337,7 @@ class MergeTool(SteeringTool):
     def dispose(self) -> None:
         """Take away what the tool has on the map, for good."""
         super().dispose()
-        self.map.scene().removeItem(self.marks)
+        remove_item(self.map, self.marks)
 
     def _mark(self) -> None:
         self.marks.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
@@ -414,7 +422,7 @@ class DrawTool(SteeringTool):
         """Take away what the tool has on the map, for good."""
         super().dispose()
         for item in (self.line, self.mark):
-            self.map.scene().removeItem(item)
+            remove_item(self.map, item)
 
     def _snapped(self, event: QgsMapMouseEvent) -> QgsPointXY:
         """Where QGIS snaps to, or else the corner or boundary of a parcel next to the cursor."""
@@ -438,3 +446,9 @@ def geometry(wkb: bytes) -> QgsGeometry:
     made = QgsGeometry()
     made.fromWkb(wkb)
     return made
+
+
+def remove_item(canvas: QgsMapCanvas, item: QgsMapCanvasItem) -> None:
+    """Take an item off the map, now: left to Python, it might die on another thread."""
+    canvas.scene().removeItem(item)
+    sip.delete(item)

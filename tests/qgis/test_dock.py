@@ -581,6 +581,37 @@ def test_selected_features_alone(table: Table, layer: Callable[..., Any]) -> Non
     assert sum(f["area_m2"] for f in table.features.values()) == pytest.approx(150**2)
 
 
+def test_what_is_there_already_is_given(table: Table, layer: Callable[..., Any]) -> None:
+    project = QgsProject.instance()
+    project.addMapLayer(layer([square(SIDE, X, Y)], name="land"))
+    street = f"LINESTRING ({X} {Y + 90}, {X + SIDE} {Y + 90})"
+    given = layer([street], kind="LineString", name="road")
+    lake = layer([square(60, X + 100, Y + 150)], name="lake")
+    project.addMapLayers([given, lake])
+    start = table.dock.start_panel
+    start.land.setLayer(project.mapLayersByName("land")[0])
+    boxes = {kind.name: box for kind, box in start.further.items()}
+    boxes["FIXED_STREETS"].setLayer(given)
+    boxes["OBSTACLES"].setLayer(lake)
+    table.click(start.begin)
+    assert table.view is not None, table.warnings
+    fixed = [f["fixed_id"] for f in table.steering.layers.streets.layer.getFeatures()]
+    assert 1 in fixed
+    area = sum(f["area_m2"] for f in table.features.values())
+    assert area == pytest.approx(SIDE**2 - 60**2)
+
+
+def test_drawing_while_the_layout_is_finished_is_refused(begun: Table) -> None:
+    begun.tool("cut")
+    QTest.mouseClick(begun.panel.finish, Qt.MouseButton.LeftButton)
+    begun.steering.cut([(X, Y + 100), (X + SIDE, Y + 100)])
+    assert begun.panel.note.text().startswith("Wait")
+    begun.wait()
+    assert begun.view.complete
+    begun.click(begun.panel.undo)
+    assert len(begun.features) == 1
+
+
 def test_what_is_wrong_with_the_land_is_said(table: Table, layer: Callable[..., Any]) -> None:
     QgsProject.instance().addMapLayer(layer([square(10, X, Y)], crs="EPSG:4326"))
     table.click(table.dock.start_panel.begin)
