@@ -20,12 +20,12 @@ from qgis.PyQt.QtWidgets import (
 )
 
 from qgis_plugin.plugin import TITLE
+from qgis_plugin.steering.choose_tool import ChooseTool
 from qgis_plugin.steering.control import Steering
 from qgis_plugin.steering.model import Hovered
 from qgis_plugin.steering.panel import SteeringPanel
 from qgis_plugin.steering.start_panel import LAYOUT_FILES, SESSIONS, StartPanel
 from qgis_plugin.steering.toolbox import CHOOSE, TOOLS, Options, map_tools
-from qgis_plugin.steering.tools import ChooseTool
 from qgis_plugin.steering.widgets import Note
 from qgis_plugin.texts import tr
 

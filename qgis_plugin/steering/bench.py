@@ -48,8 +48,8 @@ class Bench:
     def view(self, sentence: str | None = None, *, whole: bool = False) -> View:
         """Return what there is to see, and what differs from what was seen last."""
         session = self.session
-        before, self.seen = self.seen, picture_of(session)
-        return View(
+        now = picture_of(session)
+        view = View(
             sentence=session.sentence if sentence is None else sentence,
             level=session.level,
             finished=session.finished,
@@ -58,10 +58,12 @@ class Bench:
             can_redo=session.can_redo,
             figures=session.figures(),
             branches=tuple(BranchName(b.number, b.sentence, b.current) for b in session.branches()),
-            difference=difference(before, self.seen, whole=whole),
+            difference=difference(self.seen, now, whole=whole),
             crs=session.layout.frame.crs,
-            parcels=len(self.seen.parcels),
+            parcels=len(now.parcels),
         )
+        self.seen = now
+        return view
 
     def edit(self, act: Callable[[Session], Any]) -> View:
         """Change the session, and return what there is to see."""

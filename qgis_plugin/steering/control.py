@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from qgis.core import QgsApplication, QgsCoordinateReferenceSystem
-from qgis.PyQt.QtCore import QObject, QTimer, pyqtSignal
+from qgis.core import QgsApplication
+from qgis.PyQt.QtCore import pyqtSignal
 
 from qgis_plugin import dependencies
-from qgis_plugin.crs_text import crs_of
-from qgis_plugin.feedback import in_qgis
-from qgis_plugin.steering.layers import SteeringLayers
 from qgis_plugin.steering.loading import load_layers
 from qgis_plugin.steering.model import Place, Start, View
-from qgis_plugin.steering.worker import Job, Worker
+from qgis_plugin.steering.running import Runner
+from qgis_plugin.steering.worker import Job
 from qgis_plugin.texts import tr
-from urban_processing.errors import Cancelled, UrbanError
 from urban_processing.progress import Progress
 
 if TYPE_CHECKING:
     from qgis_plugin.steering.bench import Bench
 
 _HOVER = "hover"
-_DONE = object()
 
 
-class Steering(QObject):
-    """One session at a time, its layers, and the thread that works on it."""
+class Steering(Runner):
+    """One session at a time: its edits and its results."""
 
     began = pyqtSignal()
     """There is a session."""
@@ -37,62 +32,13 @@ class Steering(QObject):
     ended = pyqtSignal()
     """There is none any more."""
 
-    viewed = pyqtSignal(object)
-    """There is something new to see: a `View`."""
-
-    told = pyqtSignal(str)
-    """Something was done that leaves the session as it is."""
-
-    refused = pyqtSignal(list)
-    """Something could not be done: sentences."""
-
-    state_changed = pyqtSignal()
-    """What may be done has changed."""
-
-    progressed = pyqtSignal(float, str)
     hovered = pyqtSignal(object)
     """The parcel under the cursor: a `Hovered`, or None."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.worker = Worker()
-        self.layers = SteeringLayers()
-        self.layers.hand_edited.connect(self.state_changed)
-        self.layers.gone.connect(self.state_changed)
-        self.view: View | None = None
         self.name = ""
-        self.unsaved = False
-        self._bench: Bench | None = None
-        self._job: Job | None = None
-        self._changes: Iterator[None] | None = None
         self._context: Any = None
-        self.doing = ""
-        """What is being done, in words."""
-
-    # what may be done
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether something is being done that nothing else may be done beside."""
-        return self._job is not None or self._changes is not None
-
-    @property
-    def can_cancel(self) -> bool:
-        """Whether what is being done may be stopped."""
-        return self._job is not None and self._job.progressed is not None
-
-    @property
-    def crs(self) -> QgsCoordinateReferenceSystem:
-        """CRS of the session's coordinates."""
-        return crs_of(self.view.crs if self.view is not None else "")
-
-    def why_not(self) -> str:
-        """Say why nothing may be changed now; empty where it may."""
-        if self.is_busy:
-            return tr("Wait: {}").format(self.doing)
-        if self.layers.are_edited:
-            return tr("First take over or discard what was edited by hand.")
-        return ""
 
     # beginning and ending
 
@@ -118,11 +64,6 @@ class Steering(QObject):
         self.layers.remove()
         for owned in (self.layers, self.worker):
             owned.deleteLater()
-
-    def cancel(self) -> None:
-        """Stop what is being done at its next step."""
-        if self._job is not None:
-            self._job.cancel()
 
     # edits
 
@@ -195,11 +136,6 @@ class Steering(QObject):
         """Show the session again as it is."""
         self._change(lambda bench, _: bench.view(whole=True), by_hand=True, changes=False)
 
-    def show_layers(self) -> None:
-        """Put the layers into the project again."""
-        if self.view is not None and not self.layers.are_there:
-            self._change(lambda bench, _: bench.view(whole=True), changes=False)
-
     # looking
 
     def hover(self, place: Place, *, with_options: bool) -> None:
@@ -247,29 +183,28 @@ class Steering(QObject):
 
     def to_layers(self) -> None:
         """Finish the layout, if it is not, and load it as the toolbox does."""
-        algorithm = self._algorithm()
+        if self.view is not None and not self.view.complete:
+            self._edit(
+                lambda s, p: s.finish(progress=p), tr("The layout is finished…"), then=self._load
+            )
+        else:
+            self._load()
+
+    def _load(self) -> None:
+        algorithm, name = self._algorithm(), self.name
         if algorithm is None:
             return
-        name = self.name
 
-        def work(bench: Bench, progress: Progress) -> tuple[View, Any]:
+        def work(bench: Bench, _: Progress) -> Any:
             from qgis_plugin.steering.result import made_layers
 
-            if not bench.session.is_complete:
-                bench.session.finish(progress=progress.slice(0.0, 0.8))
-            # from here on there is no way back: the session is finished
-            return bench.view(), made_layers(bench.session.layout, algorithm, name)
+            return made_layers(bench.session.layout, algorithm, name)
 
-        def done(result: tuple[View, Any]) -> None:
-            view, context = result
+        def done(context: Any) -> None:
+            load_layers(context)
+            self.told.emit(tr("The finished layout was loaded as layers."))
 
-            def load() -> None:
-                load_layers(context)
-                self.told.emit(tr("The finished layout was loaded as layers."))
-
-            self._show(view, load)
-
-        self._with_bench(work, done, tr("The layout is finished…"), cancellable=True)
+        self._with_bench(work, done, tr("The finished layout is measured and loaded…"))
 
     # inside
 
@@ -306,97 +241,6 @@ class Steering(QObject):
 
     def _edit_parcel(self, place: Place, act: Callable[[Any, int], Any]) -> None:
         self._change(lambda bench, _: bench.edit_parcel(place, act))
-
-    def _change(
-        self,
-        work: Callable[[Bench, Progress], View],
-        doing: str = "",
-        *,
-        by_hand: bool = False,
-        changes: bool = True,
-    ) -> None:
-        """Do something that there is something new to see of."""
-        if self.layers.are_edited and not by_hand:
-            self._refuse(UrbanError(self.why_not()))
-            return
-
-        def done(view: View) -> None:
-            if by_hand:
-                self.layers.undo_hand_edits()
-            self.unsaved |= changes
-            self._show(view)
-
-        self._with_bench(work, done, doing, cancellable=bool(doing) and not by_hand)
-
-    def _with_bench(
-        self,
-        work: Callable[[Bench, Progress], Any],
-        done: Callable[[Any], None],
-        doing: str,
-        *,
-        cancellable: bool = False,
-    ) -> None:
-        bench = self._bench
-        if bench is not None:
-            self._start(partial(work, bench), done, doing, cancellable=cancellable)
-
-    def _start(
-        self,
-        work: Callable[[Progress], Any],
-        done: Callable[[Any], None],
-        doing: str,
-        *,
-        cancellable: bool,
-    ) -> None:
-        if self.is_busy:
-            if self.can_cancel:
-                self.refused.emit([self.why_not()])
-            return
-
-        def after(call: Callable[[Any], None], result: Any) -> None:
-            self._job = None
-            try:
-                call(result)
-            finally:
-                self.state_changed.emit()
-
-        self.doing = doing or tr("the last edit is still being done.")
-        self._job = Job(
-            work,
-            partial(after, done),
-            partial(after, self._refuse),
-            self.progressed.emit if cancellable else None,
-        )
-        self.worker.ask(self._job)
-        self.state_changed.emit()
-
-    def _show(self, view: View, then: Callable[[], None] | None = None) -> None:
-        """Have layers and window show what there is to see, then go on with something."""
-        self.view = view
-        if view.difference.whole and not self.layers.are_there:
-            self.layers.make(view.crs)
-        changes = self._changes = self.layers.changes(view.difference)
-
-        def go_on() -> None:
-            if self._changes is not changes:
-                return  # the session was ended meanwhile
-            if next(changes, _DONE) is not _DONE:
-                QTimer.singleShot(0, go_on)
-                return
-            self._changes = None
-            self.viewed.emit(view)
-            self.state_changed.emit()
-            if then is not None:
-                then()
-            self.show_layers()  # if somebody took them out of the project
-
-        go_on()
-
-    def _refuse(self, error: UrbanError) -> None:
-        if isinstance(error, Cancelled):
-            self.told.emit(tr("Stopped; nothing was changed."))
-        else:
-            self.refused.emit([in_qgis(problem) for problem in error.problems])
 
     def _algorithm(self) -> Any:
         registry = QgsApplication.processingRegistry()

@@ -81,6 +81,11 @@ class SteeringLayers(QObject):
         for shown in self._both:
             shown.redraw()
 
+    def set_read_only(self, read_only: bool) -> None:
+        """Let nobody edit the layers while they are about to change, or let them again."""
+        for shown in self._both:
+            shown.set_read_only(read_only)
+
     def undo_hand_edits(self) -> None:
         """Leave the layers' edit mode without keeping anything."""
         for shown in self._both:
@@ -182,6 +187,10 @@ class _ShownLayer:
         if not done:
             raise OSError(f"The layer {self.layer.name()} could not be changed.")
         self._ids.update(zip(features, (feature.id() for feature in added), strict=True))
+
+    def set_read_only(self, read_only: bool) -> None:
+        if self.layer is not None and not self.layer.isEditable():
+            self.layer.setReadOnly(read_only)
 
     def roll_back(self) -> None:
         if self.layer is not None and self.layer.isEditable():

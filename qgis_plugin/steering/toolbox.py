@@ -7,15 +7,10 @@ from dataclasses import dataclass
 
 from qgis.gui import QgsMapCanvas
 
+from qgis_plugin.steering.choose_tool import ChooseTool
 from qgis_plugin.steering.control import Steering
-from qgis_plugin.steering.tools import (
-    ChooseTool,
-    DrawTool,
-    MergeTool,
-    PointTool,
-    SteeringTool,
-    StreetTool,
-)
+from qgis_plugin.steering.drawing_tools import DrawTool, MergeTool
+from qgis_plugin.steering.tools import PointTool, SteeringTool, StreetTool
 
 CHOOSE, CUT, UNDO_CUT = "choose", "cut", "undo_cut"
 LOCK, UNLOCK, MERGE = "lock", "unlock", "merge"

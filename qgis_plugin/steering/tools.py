@@ -19,7 +19,6 @@ from qgis.gui import (
     QgsMapMouseEvent,
     QgsMapTool,
     QgsRubberBand,
-    QgsVertexMarker,
 )
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import Qt, QTimer
@@ -27,16 +26,13 @@ from qgis.PyQt.QtGui import QColor, QKeyEvent
 
 from qgis_plugin.steering.control import Steering
 from qgis_plugin.steering.model import Hovered, Place
-from qgis_plugin.steering.overlay import CandidateOverlay
 
 HOVER_MS = 80
 """Milliseconds that the cursor rests before it is asked what is under it."""
 
 REACH_PIXELS = 12
-_OUTLINE, _FILL = QColor(20, 60, 120, 230), QColor(60, 120, 200, 45)
-_CHOSEN = QColor(240, 150, 30, 90)
-_DRAWN = QColor(200, 30, 40, 220)
-_FINISHING = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+OUTLINE, _FILL = QColor(20, 60, 120, 230), QColor(60, 120, 200, 45)
+DRAWN = QColor(200, 30, 40, 220)
 
 
 class SteeringTool(QgsMapTool):
@@ -62,7 +58,7 @@ class SteeringTool(QgsMapTool):
         self.steering = steering
         self.setCursor(Qt.CursorShape.CrossCursor)
         self.outline = QgsRubberBand(canvas, QgsWkbTypes.GeometryType.PolygonGeometry)
-        self.outline.setStrokeColor(_OUTLINE)
+        self.outline.setStrokeColor(OUTLINE)
         self.outline.setFillColor(_FILL)
         self.outline.setWidth(2)
         self.under: Hovered | None = None
@@ -191,7 +187,7 @@ class StreetTool(PointTool):
     ) -> None:
         super().__init__(canvas, steering, act)
         self.line = QgsRubberBand(canvas, QgsWkbTypes.GeometryType.LineGeometry)
-        self.line.setColor(_DRAWN)
+        self.line.setColor(DRAWN)
         self.line.setWidth(5)
 
     def canvasMoveEvent(self, event: QgsMapMouseEvent) -> None:
@@ -213,232 +209,6 @@ class StreetTool(PointTool):
         """Take away what the tool has on the map, for good."""
         remove_item(self.map, self.line)
         super().dispose()
-
-
-class ChooseTool(SteeringTool):
-    """Shows the candidates of the parcel under the cursor; a click or a number chooses one."""
-
-    with_options = True
-
-    def __init__(
-        self,
-        canvas: QgsMapCanvas,
-        steering: Steering,
-        highlighted: Callable[[int], None],
-    ) -> None:
-        super().__init__(canvas, steering)
-        self.overlay = CandidateOverlay(canvas)
-        self.highlighted = highlighted
-
-    def show_hovered(self, hovered: Hovered | None) -> None:
-        """Draw the candidates of the parcel under the cursor."""
-        super().show_hovered(hovered)
-        if hovered is None:
-            self.overlay.clear()
-        else:
-            self.overlay.show_options(hovered.options, self.to_map())
-
-    def canvasMoveEvent(self, event: QgsMapMouseEvent) -> None:
-        """Have the candidate next to the cursor stand out, and look at another parcel."""
-        super().canvasMoveEvent(event)
-        if self._is_under(event.mapPoint()):
-            self._timer.stop()  # what is shown is what would be asked for
-            self.highlight(self.overlay.nearest(event.mapPoint()))
-
-    def canvasReleaseEvent(self, event: QgsMapMouseEvent) -> None:
-        """Choose the candidate next to the click."""
-        if event.button() == Qt.MouseButton.LeftButton and self._is_under(event.mapPoint()):
-            self.choose(self.overlay.nearest(event.mapPoint()))
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Choose by number."""
-        text = event.text()
-        if text.isdigit() and int(text) in self.overlay.ranks:
-            self.choose(int(text))
-            event.accept()
-        else:
-            super().keyPressEvent(event)
-
-    def highlight(self, rank: int) -> None:
-        """Have a candidate stand out on the map and in the list."""
-        self.overlay.highlight(rank)
-        self.highlighted(rank)
-
-    def choose(self, rank: int) -> None:
-        """Cut the parcel under the cursor by a candidate."""
-        if self.under is not None and rank:
-            self.steering.choose(self.under.parcel, rank)
-
-    def dispose(self) -> None:
-        """Take away what the tool has on the map, for good."""
-        super().dispose()
-        remove_item(self.map, self.overlay)
-
-    def _is_under(self, point: QgsPointXY) -> bool:
-        place = self.place(point)
-        if self.under is None or place is None:
-            return False
-        return bool(geometry(self.under.outline).contains(QgsPointXY(*place)))
-
-
-class MergeTool(SteeringTool):
-    """Collects parcels by clicks; a right click or Enter joins them."""
-
-    def __init__(self, canvas: QgsMapCanvas, steering: Steering) -> None:
-        super().__init__(canvas, steering)
-        self.chosen: dict[int, Hovered] = {}
-        self._clicked: Place | None = None
-        self.marks = QgsRubberBand(canvas, QgsWkbTypes.GeometryType.PolygonGeometry)
-        self.marks.setStrokeColor(_OUTLINE)
-        self.marks.setFillColor(_CHOSEN)
-        self.marks.setWidth(2)
-
-    def canvasReleaseEvent(self, event: QgsMapMouseEvent) -> None:
-        """Take a parcel in or out; join with the right button."""
-        if event.button() == Qt.MouseButton.RightButton:
-            self.finish()
-            return
-        self._clicked = self.place(event.mapPoint())
-        if self._clicked is not None:
-            self.steering.hover(self._clicked, with_options=False)
-
-    def show_hovered(self, hovered: Hovered | None) -> None:
-        """Outline the parcel under the cursor, and mark it if it was clicked."""
-        super().show_hovered(hovered)
-        if hovered is None or self._clicked is None:
-            return
-        if geometry(hovered.outline).contains(QgsPointXY(*self._clicked)):
-            if self.chosen.pop(hovered.parcel, None) is None:
-                self.chosen[hovered.parcel] = hovered
-            self._clicked = None
-            self._mark()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Join with Enter."""
-        if event.key() in _FINISHING:
-            self.finish()
-            event.accept()
-        else:
-            super().keyPressEvent(event)
-
-    def finish(self) -> None:
-        """Join what was clicked."""
-        if self.chosen:
-            self.steering.merge(tuple(self.chosen))
-            self.reset()
-
-    def reset(self) -> None:
-        """Forget what was clicked."""
-        self._clicked = None
-        self.chosen.clear()
-        self._mark()
-        super().reset()
-
-    def dispose(self) -> None:
-        """Take away what the tool has on the map, for good."""
-        super().dispose()
-        remove_item(self.map, self.marks)
-
-    def _mark(self) -> None:
-        self.marks.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
-        for parcel in self.chosen.values():
-            self.marks.addGeometry(geometry(parcel.outline), self.steering.crs)
-
-
-class DrawTool(SteeringTool):
-    """Draws a line by clicks; a right click or Enter ends it, Backspace takes a point back.
-
-    Parameters
-    ----------
-    finished
-        Called with the points in the session's coordinates.
-    """
-
-    hovers = False
-
-    def __init__(
-        self,
-        canvas: QgsMapCanvas,
-        steering: Steering,
-        finished: Callable[[list[Place]], None],
-    ) -> None:
-        super().__init__(canvas, steering)
-        self.finished = finished
-        self.points: list[QgsPointXY] = []
-        self.line = QgsRubberBand(canvas, QgsWkbTypes.GeometryType.LineGeometry)
-        self.line.setColor(_DRAWN)
-        self.line.setWidth(3)
-        self.mark = QgsVertexMarker(canvas)
-        self.mark.setIconType(QgsVertexMarker.IconType.ICON_BOX)
-        self.mark.setColor(_DRAWN)
-        self.mark.setIconSize(12)
-        self.mark.setPenWidth(2)
-        self.mark.setVisible(False)
-
-    def canvasReleaseEvent(self, event: QgsMapMouseEvent) -> None:
-        """Set a point; end with the right button."""
-        if event.button() == Qt.MouseButton.RightButton:
-            self.finish()
-        elif event.button() == Qt.MouseButton.LeftButton:
-            self.points.append(self._snapped(event))
-            self._draw()
-
-    def canvasMoveEvent(self, event: QgsMapMouseEvent) -> None:
-        """Draw on to the cursor."""
-        at = self._snapped(event)
-        if self.points:
-            self._draw(at)
-        self.mark.setCenter(at)
-        self.mark.setVisible(at != event.originalMapPoint())
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """End with Enter, go back with Backspace."""
-        if event.key() in _FINISHING:
-            self.finish()
-            event.accept()
-        elif event.key() in (Qt.Key.Key_Backspace, Qt.Key.Key_Delete):
-            del self.points[-1:]
-            self._draw()
-            event.accept()
-        else:
-            super().keyPressEvent(event)
-
-    def finish(self) -> None:
-        """Hand over the line."""
-        places = [self.place(point) for point in self.points]
-        known = [place for place in places if place is not None]
-        self.reset()
-        if len(known) >= 2:
-            self.finished(known)
-
-    def reset(self) -> None:
-        """Forget what was drawn."""
-        self.points = []
-        self._draw()
-        self.mark.setVisible(False)
-        super().reset()
-
-    def dispose(self) -> None:
-        """Take away what the tool has on the map, for good."""
-        super().dispose()
-        for item in (self.line, self.mark):
-            remove_item(self.map, item)
-
-    def _snapped(self, event: QgsMapMouseEvent) -> QgsPointXY:
-        """Where QGIS snaps to, or else the corner or boundary of a parcel next to the cursor."""
-        point = event.snapPoint()
-        if event.isSnapped():
-            return point
-        place = self.place(point)
-        if place is None:
-            return point
-        near = self.steering.layers.parcels.snapped(QgsPointXY(*place), self.reach(point))
-        return point if near is None else self.to_map().transform(near)
-
-    def _draw(self, *further: QgsPointXY) -> None:
-        self.line.reset(QgsWkbTypes.GeometryType.LineGeometry)
-        for point in (*self.points, *further):
-            self.line.addPoint(point)
 
 
 def geometry(wkb: bytes) -> QgsGeometry:
