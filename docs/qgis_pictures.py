@@ -37,6 +37,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--packages", type=Path, default=_packages())
     parser.add_argument("--images", type=Path, default=ROOT / "docs" / "images")
+    parser.add_argument("--only", choices=("toolbox", "steering"), default="")
     asked = parser.parse_args()
     asked.images.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home:
@@ -60,6 +61,7 @@ def main() -> int:
                 "PYTHONPATH": str(asked.packages),
                 "PYTHONWARNINGS": "ignore",
                 "URBAN_PROCESSING_SAMPLES": str(ROOT / "sample_data"),
+                "URBAN_PROCESSING_ONLY": asked.only,
                 "URBAN_PROCESSING_IMAGES": str(asked.images.resolve()),
             },
             start_new_session=True,

@@ -13,18 +13,15 @@ from qgis.core import (
     QgsProcessingException,
     QgsProcessingFeedback,
 )
-from qgis.PyQt.QtCore import QCoreApplication
 from qgis.PyQt.QtGui import QIcon
 
 from qgis_plugin import dependencies
 from qgis_plugin.definitions import CRS, definitions, is_given, parameter_name
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import errors_as_sentences, progress_to
+from qgis_plugin.texts import tr
 from urban_processing.algorithms import AlgorithmSpec, OutputKind
 from urban_processing.params import ParamField
-
-CONTEXT = "UrbanProcessing"
-"""Where translators find the texts."""
 
 _QUOTED = "“{}”"
 
@@ -167,8 +164,3 @@ class SpecAlgorithm(QgsProcessingAlgorithm):
         labels = {field.name: field.param.label for field in self.spec.params.fields()}
         labels |= {item.name: item.label for item in self.spec.inputs}
         return _QUOTED.format(labels[name])
-
-
-def tr(text: str) -> str:
-    """Return a text in the language of the user."""
-    return str(QCoreApplication.translate(CONTEXT, text))

@@ -15,6 +15,7 @@ from qgis.core import (
 )
 
 from qgis_plugin.compat import geographic_base
+from qgis_plugin.crs_text import crs_of
 from urban_processing.intake.crs_choice import CrsFacts, FloatArray, local_equal_area_again
 
 _METRE = QgsUnitTypes.DistanceUnit.DistanceMeters
@@ -81,13 +82,6 @@ class QgisCrs:
         except QgsCsException:
             return np.full_like(xy, np.inf)
         return np.asarray(shapely.get_coordinates(shapely.from_wkb(bytes(places.asWkb()))))
-
-
-def crs_of(text: str) -> QgsCoordinateReferenceSystem:
-    """Return the CRS of an authority code or WKT; an invalid one of an empty text."""
-    if text.startswith(("PROJCRS", "PROJCS", "GEOGCRS", "GEOGCS", "BOUNDCRS")):
-        return QgsCoordinateReferenceSystem.fromWkt(text)
-    return QgsCoordinateReferenceSystem(text)
 
 
 def _name_in(wkt: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from qgis.core import QgsProcessingProvider
@@ -10,14 +9,12 @@ from qgis.PyQt.QtGui import QIcon
 
 from qgis_plugin.algorithm import SpecAlgorithm
 from qgis_plugin.definitions import is_offered
-from qgis_plugin.plugin import TITLE
+from qgis_plugin.plugin import ICON, TITLE
 from urban_processing.algorithms import AlgorithmSpec, specs
 from urban_processing.version import __version__
 
 if TYPE_CHECKING:
     from qgis_plugin.styling import ResultStyle
-
-ICON = Path(__file__).with_name("icon.svg")
 
 
 class UrbanProcessingProvider(QgsProcessingProvider):

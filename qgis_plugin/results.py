@@ -18,7 +18,7 @@ from qgis.core import (
 )
 
 from qgis_plugin import compat
-from qgis_plugin.crs import crs_of
+from qgis_plugin.crs_text import crs_of
 from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.styling import ResultGroup

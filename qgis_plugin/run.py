@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from qgis.core import QgsProcessingFeedback
 
-from qgis_plugin.crs import crs_of
+from qgis_plugin.crs_text import crs_of
 from qgis_plugin.definitions import SinkName
 from qgis_plugin.destinations import Destinations
 from qgis_plugin.feedback import in_qgis
-from qgis_plugin.products import product
+from qgis_plugin.products import Product, product
 from qgis_plugin.results import write_sink
 from qgis_plugin.sources import Sources
 from qgis_plugin.styling import ResultGroup
@@ -72,10 +72,35 @@ def run(
 
             write_report(made[of], path, overwrite=True)  # in the format of its ending
         results[name] = str(path)
-    groups = {
-        name: ResultGroup(_title(sources.name, spec, params), whole.history)
-        for name, whole in products.items()
-    }
+    title = result_title(sources.name, spec, params)
+    results.update(write_sinks(products, destinations, title))
+    for whole in products.values():
+        for name, value in whole.summary:
+            feedback.pushInfo(f"{name}: {value}")
+    broken = [message for whole in products.values() for message in whole.broken]
+    if broken:
+        feedback.reportError(
+            "The layout was made, but not all that it promises holds:\n" + "\n".join(broken)
+        )
+    return results
+
+
+def write_sinks(
+    products: Mapping[str, Product], destinations: Destinations, title: str
+) -> dict[str, str]:
+    """Write the layers that were asked for, in one group for each output, and return their ids.
+
+    Parameters
+    ----------
+    products
+        What was made, by output.
+    destinations
+        Where it goes.
+    title
+        Name of the groups.
+    """
+    groups = {name: ResultGroup(title, whole.history) for name, whole in products.items()}
+    results = {}
     for sink in destinations.sinks:
         whole = products[sink.output.name]
         made_of, table = whole.layer(sink.layer)
@@ -85,14 +110,6 @@ def run(
             destinations,
             crs=whole.crs,
             group=groups[sink.output.name],
-        )
-    for whole in products.values():
-        for name, value in whole.summary:
-            feedback.pushInfo(f"{name}: {value}")
-    broken = [message for whole in products.values() for message in whole.broken]
-    if broken:
-        feedback.reportError(
-            "The layout was made, but not all that it promises holds:\n" + "\n".join(broken)
         )
     return results
 
@@ -110,7 +127,7 @@ def _say_what_inputs_say(
             feedback.pushInfo(f"CRS of the results: {crs.userFriendlyIdentifier()}.")
 
 
-def _title(land: str, spec: AlgorithmSpec, params: Params) -> str:
+def result_title(land: str, spec: AlgorithmSpec, params: Params) -> str:
     """Return the name of the group of results: land, algorithm and seed."""
     seed = params.as_dict().get("seed")
     words = [land, spec.name, "" if seed is None else f"seed {seed}"]

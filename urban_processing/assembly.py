@@ -239,7 +239,7 @@ def _steering(mesh: PlanarMesh, kept: Kept, snap: float) -> npt.NDArray[np.uint8
     for what in Steering:
         chosen = (kept.steering & what) != 0
         if chosen.any():
-            out[_on_lines(mesh, shapely.linestrings(kept.steered[chosen]), snap)] |= what
+            out[_on_lines(mesh, shapely.linestrings(kept.steered[chosen]), snap)] |= np.uint8(what)
     return out
 
 
