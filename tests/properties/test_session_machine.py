@@ -20,6 +20,7 @@ from hypothesis.stateful import (
 from lands import LANDS, holed, site_of, star
 from session_checks import (
     Seen,
+    assert_far_stay,
     assert_given_streets_stay,
     assert_locked_stay,
     assert_numbers_stay,
@@ -108,6 +109,8 @@ class SessionMachine(RuleBasedStateMachine):
         assert set(change.gone) == set(before.parcels) - set(after.parcels)
         assert_requirements(before, after, is_level=name == "step")
         assert_numbers_stay(before, after)
+        if name in ("choose", "cut", "undo_cut", "merge"):
+            assert_far_stay(before, after)
         if name not in ("unlock", "adopt", "merge"):
             assert_locked_stay(before, after)
         if name not in ("remove_street", "adopt"):

@@ -78,6 +78,8 @@ def _short_chains(layout: Layout, faces: IntArray | None) -> list[list[int]]:
     if faces is not None:
         among = np.flatnonzero(np.isin(sides, faces).any(axis=1))
         beside = np.setdiff1d(sides[among], [OUTSIDE])
+    if not len(among):
+        return []
     corners, corner_offsets = reported_corners(layout.mesh, beside)
     side = np.full(layout.mesh.n_faces + 1, np.inf)
     side[beside] = mean_side_length(layout.mesh.xy[corners], corner_offsets)
