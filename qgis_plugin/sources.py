@@ -43,7 +43,9 @@ from urban_processing.intake.given import GIVEN_COLUMNS, GivenLayers
 from urban_processing.intake.layouts import build_layout
 from urban_processing.intake.observed import build_observed
 from urban_processing.intake.sites import build_site
-from urban_processing.intake.street_lines import STREET_COLUMNS, build_streets
+from urban_processing.intake.street_lines import STREET_COLUMNS as CENTRELINE_COLUMNS
+from urban_processing.intake.street_lines import build_streets
+from urban_processing.layer_rows import PARCEL_COLUMNS, STREET_COLUMNS
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
 from urban_processing.layout_file.subdivisions import read_subdivision
@@ -143,7 +145,7 @@ class Sources:
 
     def _streets(self, item: Input) -> StreetsOnLand | None:
         """Read centrelines, and the land they are on."""
-        features = self._features(item, STREET_COLUMNS)
+        features = self._features(item, CENTRELINE_COLUMNS)
         if features is None:
             return None
         self.name = self.name or features.name
@@ -167,7 +169,7 @@ class Sources:
             features,
             library=QgisCrs(self.context.transformContext()),
             asked=self._asked_crs(),
-            streets=None if streets is None else self._features(streets, STREET_COLUMNS),
+            streets=None if streets is None else self._features(streets, CENTRELINE_COLUMNS),
             params=params,
         )
 
@@ -217,15 +219,19 @@ class Sources:
             self.name = self.name or Path(path).stem
             return read_layout(path, library=OGR, snap=snap)
         found = []
-        for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER):
+        for kind, columns in (
+            (InputKind.PARCEL_LAYER, PARCEL_COLUMNS),
+            (InputKind.STREET_LAYER, STREET_COLUMNS),
+        ):
             layer = input_of(spec, kind)
-            features = None if layer is None else self._features(layer)
+            features = None if layer is None else self._features(layer, columns)
             if features is None:
                 return None
             found.append(features)
         self.name = self.name or found[0].name
         crs = QgisCrs(self.context.transformContext())
-        return build_layout(*found, library=crs, snap=snap or 0.0)
+        min_area = self.params.as_dict().get("min_area")
+        return build_layout(*found, library=crs, snap=snap or 0.0, min_area=min_area)
 
     def _editions(self, item: Input) -> Editions | None:
         """Read two states of a layout."""

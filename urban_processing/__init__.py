@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         subdivide,
         transfer,
     )
+    from urban_processing.io.edits import read_edited
     from urban_processing.io.files import read_layout
     from urban_processing.io.frames import GeoLayers, GeoLayout
     from urban_processing.io.measured import GeoComparison, GeoFabric
@@ -67,6 +68,7 @@ _HOME = {
     "find_blocks": "urban_processing.api",
     "measure": "urban_processing.api",
     "optimize": "urban_processing.api",
+    "read_edited": "urban_processing.io.edits",
     "read_layout": "urban_processing.io.files",
     "resume": "urban_processing.api",
     "steer": "urban_processing.api",
@@ -100,6 +102,7 @@ __all__ = [
     "find_blocks",
     "measure",
     "optimize",
+    "read_edited",
     "read_layout",
     "resume",
     "steer",

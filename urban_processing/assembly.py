@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
 from urban_processing.errors import BoundaryError
-from urban_processing.land import land_corners
-from urban_processing.layout import NOT_FIXED, EdgeKind, Layout, layout_from_mesh
+from urban_processing.land import land_corners, rim_corners
+from urban_processing.layer_rows import (
+    VALUES_IGNORED,
+    ParcelRows,
+    StreetRows,
+    parcel_rows,
+    street_rows,
+    values_of_faces,
+)
+from urban_processing.layout import (
+    NOT_FIXED,
+    PARCEL_USE,
+    EdgeKind,
+    GivenStreet,
+    Layout,
+    Steering,
+    layout_from_mesh,
+)
 from urban_processing.mesh.build import canonical_rings, mesh_from_polygons
 from urban_processing.mesh.components import components
 from urban_processing.mesh.coverage import Coverage, fit_together
 from urban_processing.mesh.places import are_near, line_segments
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, IntArray, PlanarMesh
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
+from urban_processing.provenance import Step
 from urban_processing.site import Frame, Issue
+from urban_processing.street_rules import StreetRules
 
 ObjectArray = npt.NDArray[np.object_]
 
@@ -29,6 +48,67 @@ LOOKED_AT_M, LOOKED_AT = 1.0, 200_000
 DRAWN_LEVEL = 1
 """Level of streets that somebody drew."""
 
+EDITED, EDITED_SINCE = "layers_edited", "edited_since"
+"""Codes of the issues that say that parcels or streets were edited, and what became of them."""
+
+OF_AN_EDIT = frozenset({EDITED, EDITED_SINCE, VALUES_IGNORED})
+"""Codes of issues that tell of one edit and do not hold after the next."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Kept:
+    """What a layout keeps while its parcels and streets are edited; all coordinates are local.
+
+    Parameters
+    ----------
+    min_area
+        The smallest parcel allowed, m²; None for that of the smallest there is.
+    corners
+        (C, 2) corners of the land; where they were given, no others are looked for.
+    entries
+        (N, 2) places where the network meets the outside.
+    steered
+        (T, 2, 2) ends of the mesh edges that a planner decided something of.
+    steering
+        (T,) what that is, as in `Layout`.
+    corners_given, street_rules, obstacles, fixed_streets, land_uses, history, input_parts, issues
+        As in `Layout`.
+    """
+
+    min_area: float | None = None
+    corners: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    entries: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    steered: FloatArray = field(default_factory=lambda: np.empty((0, 2, 2)))
+    steering: npt.NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
+    corners_given: bool = False
+    street_rules: StreetRules = field(default_factory=StreetRules)
+    obstacles: tuple[shapely.Polygon, ...] = ()
+    fixed_streets: tuple[GivenStreet, ...] = ()
+    land_uses: tuple[str, ...] = (PARCEL_USE,)
+    history: tuple[Step, ...] = ()
+    input_parts: tuple[shapely.Polygon, ...] = ()
+    issues: tuple[Issue, ...] = ()
+
+
+def kept_of(layout: Layout) -> Kept:
+    """What there is to keep of a layout."""
+    mesh, steered = layout.mesh, np.flatnonzero(layout.edge_steering)
+    return Kept(
+        min_area=layout.min_area,
+        corners=mesh.xy[layout.vertex_corner],
+        entries=mesh.xy[layout.vertex_entry],
+        steered=mesh.xy[mesh.origin.reshape(-1, 2)[steered]],
+        steering=layout.edge_steering[steered],
+        corners_given=layout.corners_given,
+        street_rules=layout.street_rules,
+        obstacles=layout.obstacles,
+        fixed_streets=layout.fixed_streets,
+        land_uses=layout.land_uses,
+        history=layout.history,
+        input_parts=layout.input_parts,
+        issues=layout.issues,
+    )
+
 
 def assemble_layout(
     parcels: ObjectArray,
@@ -36,15 +116,15 @@ def assemble_layout(
     *,
     frame: Frame,
     snap: float,
+    kept: Kept | None = None,
     min_area: float | None = None,
-    locked: BoolArray | None = None,
-    fixed: IntArray | None = None,
-    obstacles: Sequence[shapely.Polygon] = (),
+    rows: tuple[ParcelRows, StreetRows] | None = None,
 ) -> Layout:
     """Make a layout from parcels and street lines in local metres.
 
     Parcels are snapped to each other and noded, streets are laid on the parcel boundaries
     that they run along. What that changed, and what does not fit, is said in the issues.
+    What the rows of the layers say of parcels and streets holds for what comes of them.
 
     Parameters
     ----------
@@ -56,55 +136,116 @@ def assemble_layout(
         Where the local coordinates lie.
     snap
         Metres within which things fit.
+    kept
+        What the layout has besides; nothing where the layers come from elsewhere.
     min_area
-        The smallest parcel allowed, m²; by default the smallest there is.
-    locked
-        (n,) parcels that stay as they are.
-    fixed
-        (m,) entry of `Layout.fixed_streets` that a line is, -1 for others.
-    obstacles
-        What is no land; edges on them are their rims.
+        The smallest parcel allowed, m²; by default the one that is kept, or else the smallest
+        there is.
+    rows
+        What (n,) rows say of the parcels and (m,) rows of the streets.
 
     Raises
     ------
     BoundaryError
         If nothing is left of the parcels.
     """
+    known = Kept() if kept is None else kept
+    if min_area is not None:
+        known = dataclasses.replace(known, min_area=min_area)
+    of_parcels, of_streets = rows or (parcel_rows({}, len(parcels)), street_rows({}, len(streets)))
     ends = [shapely.get_coordinates(line)[[0, -1]] for line in streets]
     places = np.concatenate(ends) if ends else None
     coverage = fit_together(parcels, snap, places=places)
     if len(coverage.polygons) == 0:
         raise BoundaryError("No parcel is left after snapping: check their size and CRS.")
     mesh = mesh_from_polygons(list(canonical_rings(coverage.polygons)))
+    smallest = float(mesh.face_area.min()) if known.min_area is None else known.min_area
     layout = layout_from_mesh(
         mesh,
         frame=frame,
         face_part=_parts(mesh),
-        min_area=float(mesh.face_area.min()) if min_area is None else min_area,
-        vertex_corner=land_corners(mesh),
+        min_area=smallest,
+        vertex_corner=_corners(mesh, known, snap),
         rim_is_street=False,
-        obstacles=obstacles,
+        obstacles=known.obstacles,
     )
-    street = _on_lines(mesh, streets, snap)
-    drawn = np.where(layout.edge_kind == EdgeKind.INTERIOR, DRAWN_LEVEL, 0)
-    layout = layout.replace(
-        edge_street=street,
-        edge_level=np.where(street, drawn, -1).astype(np.int16),
-        edge_fixed=np.where(street, _fixed(mesh, streets, fixed, snap), NOT_FIXED),
+    said = values_of_faces(
+        of_parcels.taken(coverage.source),
+        mesh.face_polygons(),
+        min_area=smallest,
+        origin=frame.origin,
+        land_uses=known.land_uses,
     )
-    if locked is not None:
-        layout = layout.replace(face_locked=locked[coverage.source])
-    issues = [*_fit_issues(coverage, parcels), *_stray_streets(layout, streets, snap)]
+    layout = _with_streets(layout, streets, of_streets, snap).replace(
+        **said.fields(),
+        edge_steering=_steering(mesh, known, snap),
+        vertex_entry=_near(mesh, known.entries, snap),
+        corners_given=known.corners_given,
+        street_rules=known.street_rules,
+        history=known.history,
+        input_parts=known.input_parts,
+        fixed_streets=known.fixed_streets,
+    )
+    issues = [
+        *(issue for issue in known.issues if _still_holds(issue)),
+        *of_parcels.issues,
+        *of_streets.issues,
+        *_fit_issues(coverage, parcels),
+        *_stray_streets(layout, streets, snap),
+    ]
     return layout.replace(issues=tuple(issues))
 
 
-def _fixed(mesh: PlanarMesh, streets: ObjectArray, fixed: IntArray | None, snap: float) -> IntArray:
-    """(E,) entry of the given street that an edge runs along, `NOT_FIXED` for none."""
-    out = np.full(mesh.n_edges, NOT_FIXED)
-    given = np.empty(0, dtype=np.int64) if fixed is None else fixed
-    for entry in np.unique(given[given != NOT_FIXED]).tolist():
-        out[_on_lines(mesh, streets[given == entry], snap)] = entry
+def _with_streets(layout: Layout, streets: ObjectArray, rows: StreetRows, snap: float) -> Layout:
+    """The layout with the streets that run along its edges, and what their rows say of them."""
+    mesh = layout.mesh
+    street = _on_lines(mesh, streets, snap)
+    level = np.where(layout.edge_kind == EdgeKind.INTERIOR, DRAWN_LEVEL, 0)
+    # what lies on two streets is of the one that was there first
+    for said in np.unique(rows.level[rows.level >= 0])[::-1].tolist():
+        level[_on_lines(mesh, streets[rows.level == said], snap)] = said
+    fixed = np.full(mesh.n_edges, NOT_FIXED)
+    for entry in np.unique(rows.fixed[rows.fixed != NOT_FIXED]).tolist():
+        fixed[_on_lines(mesh, streets[rows.fixed == entry], snap)] = entry
+    return layout.replace(
+        edge_street=street,
+        edge_level=np.where(street, level, -1).astype(np.int16),
+        edge_fixed=np.where(street, fixed, NOT_FIXED),
+    )
+
+
+def _corners(mesh: PlanarMesh, kept: Kept, snap: float) -> BoolArray:
+    """(V,) corners of the land that are kept, and unless these were given all that are found.
+
+    A bend in the side between two parcels, such as people draw, is one as well.
+    """
+    out = _near(mesh, kept.corners, snap)
+    if kept.corners_given and out.any():
+        return out
+    bends = land_corners(mesh) & (mesh.valence == 2)
+    return np.asarray(out | rim_corners(mesh) | bends)
+
+
+def _near(mesh: PlanarMesh, places: FloatArray, snap: float) -> BoolArray:
+    """(V,) vertices within the tolerance of one of some places."""
+    if len(places) == 0:
+        return np.zeros(mesh.n_vertices, dtype=bool)
+    return are_near(mesh.xy, list(shapely.points(places)), snap)
+
+
+def _steering(mesh: PlanarMesh, kept: Kept, snap: float) -> npt.NDArray[np.uint8]:
+    """(E,) what a planner decided of the edges, where they still are."""
+    out = np.full(mesh.n_edges, Steering.NONE, dtype=np.uint8)
+    for what in Steering:
+        chosen = (kept.steering & what) != 0
+        if chosen.any():
+            out[_on_lines(mesh, shapely.linestrings(kept.steered[chosen]), snap)] |= np.uint8(what)
     return out
+
+
+def _still_holds(issue: Issue) -> bool:
+    """Whether an issue of the layout before is one of the land as a whole, however it is edited."""
+    return issue.parcel_id is issue.part is issue.geometry is None and issue.code not in OF_AN_EDIT
 
 
 def _parts(mesh: PlanarMesh) -> IntArray:

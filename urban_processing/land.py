@@ -396,13 +396,25 @@ def _corners_of(site: Site) -> tuple[FloatArray, dict[int, int]]:
 
 
 def land_corners(mesh: PlanarMesh) -> BoolArray:
-    """(V,) vertices of the rim where it bends by more than 45° (Chen 2024, section 3)."""
+    """(V,) vertices of the rim where it bends by more than 45° (Chen 2024, section 3).
+
+    The land is not cut yet: its parts are the faces.
+    """
+    return _bends(mesh, mesh.loops.face != OUTSIDE)
+
+
+def rim_corners(mesh: PlanarMesh) -> BoolArray:
+    """(V,) the same for land that is cut into parcels."""
+    return _bends(mesh, mesh.loops.face == OUTSIDE)
+
+
+def _bends(mesh: PlanarMesh, chosen: BoolArray) -> BoolArray:
+    """(V,) vertices where one of some loops bends by more than 45°."""
     loops = mesh.loops
     out = np.zeros(mesh.n_vertices, dtype=bool)
     angles = interior_angles(mesh.xy[mesh.origin[loops.half_edges]], loops.offsets)
     included = np.pi - np.abs(angles - np.pi)
-    face = np.repeat(loops.face, np.diff(loops.offsets))
-    bends = (included < STRAIGHT_ANGLE) & (face != OUTSIDE)
+    bends = (included < STRAIGHT_ANGLE) & np.repeat(chosen, np.diff(loops.offsets))
     out[mesh.origin[loops.half_edges[bends]]] = True
     return out
 

@@ -23,8 +23,8 @@ from urban_processing.site import FloatArray, Frame, Issue
 class Table:
     """Columns of one length, in the order of the schema, and a geometry in map coordinates.
 
-    Missing values are NaN in columns of numbers (a column of whole numbers that may be
-    missing is float64), ``None`` in geometries.
+    Missing values are NaN in columns of numbers (a column of whole numbers, or of yes and no,
+    that may be missing is float64), ``None`` in geometries.
     """
 
     columns: dict[str, npt.NDArray[Any]]
@@ -106,7 +106,7 @@ def make_table(
         given = values[column.name]
         if column.dtype is ColumnType.TEXT:
             columns[column.name] = objects(np.asarray(given, dtype=object).tolist())
-        elif column.dtype is ColumnType.INTEGER and column.nullable:
+        elif column.dtype in (ColumnType.INTEGER, ColumnType.BOOLEAN) and column.nullable:
             columns[column.name] = np.asarray(given, dtype=np.float64)
         else:
             columns[column.name] = np.asarray(given, dtype=column.dtype.value)
@@ -129,12 +129,13 @@ def _typed(values: npt.NDArray[Any]) -> tuple[ColumnType, npt.NDArray[Any]]:
     plain = values.tolist() if values.dtype.kind != "M" else np.datetime_as_string(values).tolist()
     missing = [value is None or value != value or value == "NaT" for value in plain]
     there = [value for value, gap in zip(plain, missing, strict=True) if not gap]
-    if there and all(isinstance(value, bool | np.bool_) for value in there) and not any(missing):
-        return ColumnType.BOOLEAN, np.array(there, dtype=bool)
-    if there and all(isinstance(value, int | float | np.number) for value in there):
+    truths = bool(there) and all(isinstance(value, bool | np.bool_) for value in there)
+    if truths or (there and all(isinstance(v, int | float | np.number) for v in there)):
         numbers = np.array(
             [np.nan if gap else float(v) for v, gap in zip(plain, missing, strict=True)]
         )
+        if truths:
+            return ColumnType.BOOLEAN, numbers
         whole = all(isinstance(value, int | np.integer) for value in there)
         exact = whole and (np.abs(numbers[~np.array(missing)]) < 2.0**53).all()
         return (ColumnType.INTEGER if exact else ColumnType.REAL), numbers

@@ -40,8 +40,9 @@ SHELL_ONLY = {
 }
 
 
-LEFT_OUT = {"export"}
-"""Algorithms that make plain files: in QGIS each sink goes to a file of any format."""
+LEFT_OUT = {"edit", "export"}
+"""Algorithms that make plain files, as every sink of QGIS does, and the one for saved sessions,
+which QGIS opens in a panel."""
 
 OFFERED = tuple(spec for spec in specs() if spec.name not in LEFT_OUT)
 

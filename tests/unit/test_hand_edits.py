@@ -8,10 +8,11 @@ import shapely
 from grid_layouts import grid, layout_of
 from shapely.affinity import translate
 
+from urban_processing.assembly import EDITED_SINCE
 from urban_processing.errors import BoundaryError
 from urban_processing.layout import Layout
 from urban_processing.persistence.layers import Change
-from urban_processing.pipelines.hand_edits import EDITED_SINCE, edits_listed, match_parcels
+from urban_processing.pipelines.hand_edits import edits_listed, match_parcels
 from urban_processing.site import Frame
 
 MIDDLE = [(0, 2), (4, 2)]

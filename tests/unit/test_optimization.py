@@ -276,7 +276,7 @@ def test_cogenerate_optimizes_and_tells_what_it_gained() -> None:
     site = site_of(LANDS["star"])
     smooth = cogenerate(site, CogenerateParams(parcels=60))
     plain = cogenerate(site, CogenerateParams(parcels=60, optimize=False))
-    assert plain.history[-1].results == {}
+    assert "moved_mean_m" not in plain.history[-1].results
     told = smooth.history[-1].results
     assert told["energy_regularity_after"] < told["energy_regularity_before"]
     assert told["moved_max_m"] >= told["moved_mean_m"] > 0

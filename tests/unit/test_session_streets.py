@@ -17,7 +17,8 @@ from urban_processing.errors import EditError
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.layout import NOT_FIXED, EdgeKind, GivenStreet, Steering
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.pipelines.levels import begin, finish, step, with_streets
+from urban_processing.pipelines.finish import finish
+from urban_processing.pipelines.levels import begin, step, with_streets
 from urban_processing.session.cutting import cut_faces, path_across
 from urban_processing.session.drawn_line import as_line
 from urban_processing.session.moment import Moment, first_moment, next_moment

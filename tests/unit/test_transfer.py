@@ -275,3 +275,30 @@ def test_a_layout_moved_as_a_whole_is_said(before):
     assert (made.parcels.change == "moved").all()
     said = made.issues.set_index("code").message["layout_moved"]
     assert "turned by 40° and scaled by 1.2" in said
+
+
+def test_yes_and_no_stay_so_where_some_are_missing(tmp_path):
+    boxes = [shapely.box(x, 0, x + 20, 30) for x in (0, 20, 40)]
+    before = frame(boxes[:2], parcel_id=[4, 5], listed=[True, False])
+    after = frame([*boxes[:2], shapely.box(900, 0, 920, 30)])
+    made = up.transfer(before, after)
+    assert made.parcels.listed.dtype == "boolean"
+    assert made.parcels.listed.tolist() == [True, False, pd.NA]
+    made.save(tmp_path / "made.gpkg")
+    info = pyogrio.read_info(tmp_path / "made.gpkg", layer="parcels")
+    assert dict(zip(info["fields"], info["ogr_subtypes"], strict=True))["listed"] == "OFSTBoolean"
+    read = gpd.read_file(tmp_path / "made.gpkg", layer="parcels")
+    assert [None if pd.isna(v) else bool(v) for v in read.listed] == [True, False, None]
+    whole = up.transfer(before, frame(boxes[:2])).parcels
+    assert whole.listed.dtype == bool
+
+
+def test_a_run_ends_by_saying_that_nothing_was_found_again(tmp_path):
+    paths = [tmp_path / f"{name}.gpkg" for name in ("before", "after", "made")]
+    town_of_two = [shapely.box(x, 0, x + 20, 30) for x in (0, 20)]
+    frame(town_of_two, parcel_id=[1, 2]).to_file(paths[0])
+    far = shapely.Polygon([(5000, 0), (5300, 10), (5200, 700), (5100, 300)])
+    frame([far]).to_file(paths[1])
+    ran = CliRunner().invoke(app, ["transfer", *map(str, paths[:2]), "-o", str(paths[2])])
+    assert ran.exit_code == 0
+    assert "Do the layers show the same place?" in " ".join(ran.output.split())

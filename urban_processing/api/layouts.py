@@ -217,7 +217,8 @@ def _layout(
         raise BoundaryError("Give a layout, or parcels and streets.")
     snap = OptimizeParams.snap if params is None else params.snap
     if layout is None:
-        return read_layers(parcels, streets, snap=snap)
+        min_area = None if params is None else params.min_area
+        return read_layers(parcels, streets, snap=snap, min_area=min_area)
     if isinstance(layout, GeoLayout):
         return layout.layout
     if isinstance(layout, Layout):

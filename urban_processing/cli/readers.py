@@ -84,7 +84,7 @@ def _read_layout(
     problems += wrong
     if wrong or not names:
         return None
-    snap = _snap(spec, given)
+    snap = _usable(spec, given, "snap")
     if given[item.name] is not None:
         from urban_processing.io.files import read_layout
 
@@ -94,7 +94,8 @@ def _read_layout(
     parcels, streets = (
         _given_of(spec, given, kind) for kind in (InputKind.PARCEL_LAYER, InputKind.STREET_LAYER)
     )
-    return read_layers(parcels, streets, snap=snap or 0.0)
+    min_area = _usable(spec, given, "min_area")
+    return read_layers(parcels, streets, snap=snap or 0.0, min_area=min_area)
 
 
 @_collecting
@@ -117,23 +118,24 @@ def _read_steered(
         problems += error.problems
     start = read_start(
         given[item.name],
-        snap=_snap(spec, given) or 0.0,
+        snap=_usable(spec, given, "snap") or 0.0,
         **{name: given[name] for name in ("layer", "where", "crs")},
         **{i.kind.of_site: given[i.name] for i in spec.inputs if i.kind.of_site},
     )
     return None if saved is None else Steered(start, saved)
 
 
-def _snap(spec: AlgorithmSpec, given: Mapping[str, Any]) -> float | None:
-    """Tolerance with which edited layers are read, the default where it is no number.
+def _usable(spec: AlgorithmSpec, given: Mapping[str, Any], name: str) -> float | None:
+    """Value of a number that layers are read with, the default where it is no number.
 
-    None where an algorithm takes no edited layers.
+    None where an algorithm has no such parameter.
     """
-    if "snap" not in given:
+    if name not in given:
         return None
-    values = {} if given["snap"] is None else {"snap": given["snap"]}
+    values = {} if given[name] is None else {name: given[name]}
     usable = {} if spec.params.problems_with(values) else values
-    return float(spec.params.from_values(usable).as_dict()["snap"])
+    value = spec.params.from_values(usable).as_dict()[name]
+    return None if value is None else float(value)
 
 
 def _called(spec: AlgorithmSpec, name: str) -> str:

@@ -233,6 +233,8 @@ def table_frame(
         values = np.empty(0, dtype=object) if table is None else table[column.name]
         if column.dtype is ColumnType.INTEGER and column.nullable:
             columns[column.name] = pd.array(values, dtype="Int64")
+        elif column.dtype is ColumnType.BOOLEAN and np.isnan(values.astype(np.float64)).any():
+            columns[column.name] = pd.array(values, dtype="boolean")
         elif column.dtype is ColumnType.TEXT:
             columns[column.name] = pd.Series(values, dtype="str")
         else:

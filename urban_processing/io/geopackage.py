@@ -48,6 +48,11 @@ class Pyogrio:
         with _os_errors():
             return [str(name) for name in pyogrio.list_layers(path)[:, 0]]
 
+    def column_names(self, path: Path, layer: str) -> list[str]:
+        """Return the names of a layer's columns."""
+        with _os_errors():
+            return [str(name) for name in pyogrio.read_info(path, layer=layer)["fields"]]
+
 
 PYOGRIO = Pyogrio()
 

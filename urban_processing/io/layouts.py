@@ -7,15 +7,24 @@ from urban_processing.intake.layouts import build_layout
 from urban_processing.io.crs import PYPROJ
 from urban_processing.io.features import Source
 from urban_processing.io.layers import read_layer
+from urban_processing.layer_rows import PARCEL_COLUMNS, STREET_COLUMNS
 from urban_processing.layout import Layout
 from urban_processing.schema import PARCELS, STREETS
 
 
-def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
+def read_layers(
+    parcels: Source,
+    streets: Source,
+    *,
+    snap: float,
+    min_area: float | None = None,
+    before: Layout | None = None,
+) -> Layout:
     """Make a layout from a layer of parcels and one of streets; it promises what it has.
 
     Parcels are snapped to each other and noded, streets are laid on the parcel boundaries
-    that they run along; the issues say what that changed.
+    that they run along; the issues say what that changed. Columns of parcels and streets that a
+    layout file has, too, such as land_use, locked and level, count.
 
     Parameters
     ----------
@@ -26,6 +35,10 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
         Lines, likewise; in another CRS they are reprojected.
     snap
         Metres within which things fit.
+    min_area
+        The smallest parcel allowed, m²; by default the smallest there is.
+    before
+        The layout that the layers are edited from, whose CRS, parameters and decisions go on.
 
     Raises
     ------
@@ -33,8 +46,12 @@ def read_layers(parcels: Source, streets: Source, *, snap: float) -> Layout:
         With everything that is wrong with the layers.
     """
     problems: list[str] = []
-    polygons = read_layer("Parcels", parcels, problems, usual=PARCELS.name, columns=())
-    lines = read_layer("Streets", streets, problems, usual=STREETS.name, kind="line", columns=())
+    polygons = read_layer("Parcels", parcels, problems, usual=PARCELS.name, columns=PARCEL_COLUMNS)
+    lines = read_layer(
+        "Streets", streets, problems, usual=STREETS.name, kind="line", columns=STREET_COLUMNS
+    )
     if polygons is None or lines is None:
         raise BoundaryError(problems)
-    return build_layout(polygons, lines, library=PYPROJ, snap=snap)
+    return build_layout(
+        polygons, lines, library=PYPROJ, snap=snap, min_area=min_area, before=before
+    )

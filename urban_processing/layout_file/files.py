@@ -5,18 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import shapely
 
-from urban_processing.assembly import assemble_layout
-from urban_processing.errors import BoundaryError, TopologyError, UrbanError
-from urban_processing.layout import NOT_FIXED, GivenStreet, Layout, Stage
+from urban_processing.errors import BoundaryError, UrbanError
+from urban_processing.layout import Layout
 from urban_processing.layout_file.geopackage import (
     LAYERS_STATE,
     LAYOUT_STATE,
@@ -24,27 +20,19 @@ from urban_processing.layout_file.geopackage import (
     read_state,
     write_geopackage,
 )
+from urban_processing.layout_file.reading import LayoutFile, read_edited, read_exactly
 from urban_processing.layout_file.writing import replacing, writable
-from urban_processing.mesh.places import line_segments, vertices_at
 from urban_processing.metrics.tables import layout_tables
-from urban_processing.provenance import Step, timeless
-from urban_processing.rebuild import LayoutParts, canonical, rebuild_layout
+from urban_processing.provenance import timeless
+from urban_processing.rebuild import canonical
 from urban_processing.schema import (
-    INPUT_BOUNDARY,
-    ISSUES,
-    OBSTACLES,
-    PARCELS,
-    PROVENANCE,
-    STREETS,
     layer,
 )
-from urban_processing.site import FloatArray, Frame, Issue
-from urban_processing.street_rules import StreetRules
+from urban_processing.site import Frame
 from urban_processing.tables import Table
 
 FILE_FORMAT = 2
-"""Number of the way in which layout files keep what the schema does not say. Files of format 1
-know no stages of parcels: they were all finished."""
+"""Number of the way in which layout files keep what the schema does not say."""
 
 
 def write_layout(
@@ -129,112 +117,13 @@ def read_layout(
     source = Path(path)
     state = _read_state(source)
     x, y = state["origin"]
-    file = _File(source, Frame(state["crs"], (float(x), float(y))), library)
+    file = LayoutFile(source, Frame(state["crs"], (float(x), float(y))), library)
     try:
-        return _read_exactly(file, state)
+        return read_exactly(file, state)
     except UrbanError:
         if snap is None:
             raise
-    return _read_edited(file, state, snap)
-
-
-def _read_exactly(file: _File, state: Mapping[str, Any]) -> Layout:
-    """Read the layout that was written."""
-    source = file.path
-    try:
-        parts = _read_parts(file, state)
-        issues = _read_issues(file)
-        layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
-        return layout.replace(
-            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
-            corners_given=state["corners_given"],
-            history=_read_history(file),
-            input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
-        )
-    except TopologyError as error:
-        raise TopologyError(
-            [
-                f"The parcels and streets of {source} do not fit together any more; were they "
-                "edited?",
-                *error.problems,
-            ]
-        ) from error
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise BoundaryError(f"{source} is damaged or was changed: {error}") from error
-
-
-def _read_edited(file: _File, state: Mapping[str, Any], snap: float) -> Layout:
-    """Read parcels and streets, whatever was done to them, and fit them together."""
-    try:
-        parcels, parcel = file.layer(PARCELS.name, "locked")
-        streets, street = file.layer(STREETS.name, "fixed_id")
-        polygons, of_parcel = _single(parcels, "Polygon")
-        lines, of_street = _single(streets, "LineString")
-        locked = np.array([value is True or value == 1 for value in parcel["locked"].tolist()])
-        layout = assemble_layout(
-            polygons,
-            lines,
-            frame=file.frame,
-            snap=snap,
-            min_area=state["min_area"],
-            locked=locked[of_parcel],
-            fixed=_fixed_entries(street["fixed_id"])[of_street],
-            obstacles=_read_polygons(file, OBSTACLES.name),
-        )
-        note = Issue("layers_edited", "Parcels or streets of the file were edited.")
-        return layout.replace(
-            street_rules=StreetRules.from_dict(state.get("street_rules", {})),
-            issues=(note, *layout.issues),
-            history=_read_history(file),
-            input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
-            fixed_streets=_given_streets(state),
-            vertex_entry=vertices_at(layout.mesh.xy, _places(state["entries"])),
-        )
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise BoundaryError(f"{file.path} cannot be read: {error}") from error
-
-
-def _single(
-    geometry: npt.NDArray[np.object_], kind: str
-) -> tuple[npt.NDArray[np.object_], npt.NDArray[np.int64]]:
-    """Valid single geometries of a kind, and the row that each comes from."""
-    rows = np.flatnonzero(~shapely.is_missing(geometry))
-    valid = shapely.make_valid(shapely.force_2d(geometry[rows]))
-    parts, index = shapely.get_parts(valid, return_index=True)
-    chosen = [i for i, p in enumerate(parts) if p.geom_type == kind and not p.is_empty]
-    return parts[chosen], rows[index[chosen]]
-
-
-def _fixed_entries(fixed_id: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """Entries of given streets from their numbers, which begin with 1; `NOT_FIXED` for none."""
-    known = np.nan_to_num(np.asarray(fixed_id, dtype=np.float64), nan=NOT_FIXED + 1)
-    return known.astype(np.int64) - 1
-
-
-def _given_streets(state: Mapping[str, Any]) -> tuple[GivenStreet, ...]:
-    return tuple(
-        GivenStreet(name, math.nan if width is None else width)
-        for name, width in state["fixed_streets"]
-    )
-
-
-@dataclass(frozen=True)
-class _File:
-    """A layout file, the frame of its local coordinates, and what reads it."""
-
-    path: Path
-    frame: Frame
-    library: LayerLibrary
-
-    def layer(
-        self, name: str, *columns: str
-    ) -> tuple[npt.NDArray[np.object_], dict[str, npt.NDArray[Any]]]:
-        """Geometries in local coordinates and columns, in the order in which they were written."""
-        geometry, values = self.library.read_layer(self.path, name, columns)
-        return self.local(geometry), values
-
-    def local(self, geometry: Any) -> Any:
-        return shapely.transform(geometry, lambda xy: xy - np.asarray(self.frame.origin))
+    return read_edited(file, state, snap)
 
 
 def _what_else(path: Path) -> str:
@@ -288,103 +177,3 @@ def _read_state(path: Path) -> dict[str, Any]:
             f"{path} was written by a newer version of this software: update to read it."
         )
     return state
-
-
-def _read_parts(file: _File, state: Mapping[str, Any]) -> LayoutParts:
-    columns = ["parcel_id", "part", "level", "lineage", "locked", "land_use"]
-    if state["format"] > 1:
-        columns += ["stage", "quota"]
-    polygons, parcel = file.layer(PARCELS.name, *columns)
-    order = np.argsort(parcel["parcel_id"], kind="stable")
-    lines, street = file.layer(STREETS.name, "level", "fixed_id")
-    segments, line = line_segments(lines)
-    lineage = [int(text, 16) for text in parcel["lineage"]]
-    uses = list(state["land_uses"])
-    uses += sorted(set(parcel["land_use"].tolist()) - set(uses))
-    use = [uses.index(name) for name in parcel["land_use"].tolist()]
-    stage, quota = _stages(parcel, len(polygons))
-    steered = np.asarray(state.get("steered_edges", []), dtype=np.float64).reshape(-1, 5)
-    return LayoutParts(
-        polygons=polygons[order],
-        face_part=parcel["part"][order],
-        face_level=parcel["level"][order],
-        face_lineage=np.array(lineage, dtype=np.uint64)[order],
-        face_locked=parcel["locked"].astype(bool)[order],
-        segments=segments,
-        segment_level=np.asarray(street["level"], dtype=np.int16)[line],
-        segment_fixed=_fixed_entries(street["fixed_id"])[line],
-        corners=_places(state["corners"]),
-        entries=_places(state["entries"]),
-        face_use=np.array(use, dtype=np.int64)[order],
-        face_stage=stage[order],
-        face_quota=quota[order],
-        steered=steered[:, :4].reshape(-1, 2, 2),
-        steering=steered[:, 4].astype(np.uint8),
-        obstacles=_read_polygons(file, OBSTACLES.name),
-        fixed_streets=_given_streets(state),
-        land_uses=tuple(uses),
-    )
-
-
-def _stages(
-    parcel: Mapping[str, npt.NDArray[Any]], n_parcels: int
-) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.int64]]:
-    """Stage and quota of each parcel; done and none where the file does not know them."""
-    if "stage" not in parcel:
-        return np.full(n_parcels, Stage.DONE, dtype=np.int8), np.zeros(n_parcels, dtype=np.int64)
-    stage = [Stage[name.upper()] for name in parcel["stage"].tolist()]
-    quota = np.nan_to_num(np.asarray(parcel["quota"], dtype=np.float64))
-    return np.array(stage, dtype=np.int8), quota.astype(np.int64)
-
-
-def _places(xy: Any) -> FloatArray:
-    return np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-
-
-def _read_issues(file: _File) -> tuple[Issue, ...]:
-    geometry, column = file.layer(ISSUES.name, *ISSUES.column_names)
-    return tuple(
-        Issue(
-            code=str(column["code"][i]),
-            message=str(column["message"][i]),
-            part=_whole(column["part"][i]),
-            parcel_id=_whole(column["parcel_id"][i]),
-            value=_number(column["value"][i]),
-            limit=_number(column["limit"][i]),
-            geometry=place,
-        )
-        for i, place in enumerate(geometry)
-    )
-
-
-def _read_history(file: _File) -> tuple[Step, ...]:
-    _, column = file.layer(PROVENANCE.name, *PROVENANCE.column_names)
-    return tuple(
-        Step(
-            algorithm=str(column["algorithm"][i]),
-            parameters=json.loads(column["parameters"][i]),
-            seed=int(column["seed"][i]),
-            version=str(column["version"][i]),
-            input_sha256=str(column["input_sha256"][i]),
-            seconds=float(column["seconds"][i]),
-            results=json.loads(column["results"][i]),
-        )
-        for i in np.argsort(column["step"], kind="stable")
-    )
-
-
-def _read_polygons(file: _File, name: str) -> tuple[shapely.Polygon, ...]:
-    """Polygons of a layer, none where there is no such layer."""
-    if name not in file.library.layer_names(file.path):
-        return ()
-    geometry, _ = file.layer(name, "part")
-    return tuple(geometry)
-
-
-def _whole(value: float | None) -> int | None:
-    number = _number(value)
-    return None if number is None else int(number)
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or math.isnan(value) else float(value)

@@ -93,6 +93,10 @@ class LayerLibrary(Protocol):
         """Return the names of a file's layers."""
         ...
 
+    def column_names(self, path: Path, layer: str) -> list[str]:
+        """Return the names of a layer's columns."""
+        ...
+
 
 def write_geopackage(
     path: Path,
@@ -133,10 +137,10 @@ def field_arrays(
     for column in layer.columns:
         given = table.columns[column.name]
         mask = None
-        if column.dtype in (ColumnType.INTEGER, ColumnType.REAL) and given.dtype.kind == "f":
+        if column.dtype is not ColumnType.TEXT and given.dtype.kind == "f":
             missing = np.isnan(given)
-            if column.dtype is ColumnType.INTEGER:
-                given = np.where(missing, 0, given).astype(np.int64)
+            if column.dtype is not ColumnType.REAL:
+                given = np.where(missing, 0, given).astype(column.dtype.value)
             mask = missing if missing.any() else None
         names.append(column.name)
         values.append(given)

@@ -66,6 +66,16 @@ def segments_on(
     return pairs[:, 0], pairs[:, 1]
 
 
+def edges_on(
+    mesh: PlanarMesh, other: PlanarMesh, chosen: BoolArray, distance: float
+) -> tuple[IntArray, IntArray]:
+    """Edges of a mesh that lie on chosen edges of another one, and on which of them."""
+    some = np.flatnonzero(chosen)
+    lines = shapely.linestrings(other.xy[other.origin.reshape(-1, 2)[some]])
+    on, edge = segments_on(mesh.xy[mesh.origin.reshape(-1, 2)], lines, distance)
+    return edge, some[on]
+
+
 def are_near(xy: FloatArray, geometries: Sequence[shapely.Geometry], distance: float) -> BoolArray:
     """(n,) which places lie within some metres of one of the geometries."""
     at, _ = shapely.STRtree(geometries).query(

@@ -9,16 +9,9 @@ from dataclasses import dataclass
 from urban_processing.errors import InfeasibleError
 from urban_processing.layout import Layout
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.pipelines.levels import (
-    ALGORITHM,
-    MEAN_OVER_MIN,
-    State,
-    begin,
-    finish,
-    pause,
-    smallest_area,
-    step,
-)
+from urban_processing.pipelines.finish import finish
+from urban_processing.pipelines.levels import MEAN_OVER_MIN, State, begin, smallest_area, step
+from urban_processing.pipelines.stops import ALGORITHM, pause
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
 from urban_processing.site import Site

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from urban_processing.assembly import EDITED_SINCE
 from urban_processing.errors import BoundaryError
 from urban_processing.layout import Layout
 from urban_processing.mesh.planar import IntArray
@@ -16,9 +17,6 @@ from urban_processing.persistence.tables import changes_table
 from urban_processing.persistence.transfer import ParcelsInBlocks, Transfer, transfer
 from urban_processing.site import Issue
 from urban_processing.tables import LayerSet
-
-EDITED_SINCE = "edited_since"
-"""Code of the issue that says what became of the parcels since the layout before."""
 
 _IN_WORDS = {
     Change.KEPT: "{n:,} kept as they were",

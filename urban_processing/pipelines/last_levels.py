@@ -12,8 +12,8 @@ from urban_processing.layout import Layout, Steering, layout_from_mesh
 from urban_processing.mesh.build import canonical_rings, mesh_from_polygons
 from urban_processing.mesh.components import components
 from urban_processing.mesh.coverage import fit_together
-from urban_processing.mesh.places import segments_on, vertices_at
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, IntArray, PlanarMesh
+from urban_processing.mesh.places import edges_on, vertices_at
+from urban_processing.mesh.planar import OUTSIDE, IntArray
 from urban_processing.params.subdivide import SubdivideParams
 from urban_processing.parcelling.divide import divide
 from urban_processing.parcelling.ground import Ground, Pieces
@@ -151,11 +151,11 @@ def _rebuilt(layout: Layout, outlines: list[_Outline], pieces: Pieces, whole: Wh
         rim_is_street=False,
         obstacles=layout.obstacles,
     )
-    edge, street = _edges_on(after, layout, layout.edge_street)
+    edge, street = edges_on(after, mesh, layout.edge_street, 2 * TOGETHER)
     edge_level, edge_fixed = rebuilt.edge_level.copy(), rebuilt.edge_fixed.copy()
     edge_level[edge], edge_fixed[edge] = layout.edge_level[street], layout.edge_fixed[street]
     edge_steering = rebuilt.edge_steering.copy()
-    edge, steered = _edges_on(after, layout, layout.edge_steering != Steering.NONE)
+    edge, steered = edges_on(after, mesh, layout.edge_steering != Steering.NONE, 2 * TOGETHER)
     edge_steering[edge] = layout.edge_steering[steered]
     return rebuilt.replace(
         vertex_entry=vertices_at(after.xy, mesh.xy[layout.vertex_entry]),
@@ -175,13 +175,3 @@ def _rebuilt(layout: Layout, outlines: list[_Outline], pieces: Pieces, whole: Wh
         fixed_streets=layout.fixed_streets,
         land_uses=layout.land_uses,
     )
-
-
-def _edges_on(mesh: PlanarMesh, before: Layout, chosen: BoolArray) -> tuple[IntArray, IntArray]:
-    """Edges of the mesh that lie on chosen ones of the layout before, and on which of them."""
-    old = before.mesh
-    some = np.flatnonzero(chosen)
-    lines = shapely.linestrings(old.xy[old.origin.reshape(-1, 2)[some]])
-    edges = mesh.xy[mesh.origin.reshape(-1, 2)]
-    on, edge = segments_on(edges, lines, 2 * TOGETHER)
-    return edge, some[on]

@@ -7,7 +7,7 @@ import time
 from urban_processing.layout import Layout
 from urban_processing.params.resume import ResumeParams
 from urban_processing.pipelines.cogenerate import go_on
-from urban_processing.pipelines.levels import state_of
+from urban_processing.pipelines.stops import state_of
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
 from urban_processing.version import __version__

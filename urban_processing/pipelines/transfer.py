@@ -32,6 +32,10 @@ from urban_processing.site import Issue
 from urban_processing.tables import LayerSet, Table, issue_table, make_table, to_map, with_columns
 from urban_processing.version import __version__
 
+NOTHING_IN_COMMON, MOVED = "nothing_in_common", "layout_moved"
+TOLD = frozenset({NOTHING_IN_COMMON, MOVED})
+"""Codes of the issues that a run ends with: they may mean that a layer is the wrong one."""
+
 _MAX_NAMED = 5
 
 _STILL = 1e-3
@@ -89,6 +93,7 @@ def transfer(editions: Editions, params: TransferParams, progress: Progress = SI
         results={change.value: made.changes.count(change) for change in Change},
     )
     summary = [(change.value, f"{made.changes.count(change):,} parcels") for change in Change]
+    summary += [("note", issue.message) for issue in issues if issue.code in TOLD]
     return LayerSet("transfer", tables, editions.frame, (step,), tuple(summary))
 
 
@@ -161,14 +166,28 @@ def _said(made: Transfer, editions: Editions) -> list[Issue]:
         turn = np.degrees(np.arctan2(matrix[1, 0] - matrix[0, 1], matrix[0, 0] + matrix[1, 1]))
         size = f"scaled by {scale:.4g}" if abs(scale - 1.0) > _STILL else "not scaled"
         message = f"The layout as a whole was moved, turned by {turn:.4g}° and {size}."
-        issues.append(Issue("layout_moved", message, value=scale))
+        issues.append(Issue(MOVED, message, value=scale))
     if (made.source == NONE).all():
         message = (
             f"No parcel of {editions.before.name} was found again in {editions.after.name}: all "
             "numbers are new. Do the layers show the same place?"
         )
-        issues.append(Issue("nothing_in_common", message))
+        issues.append(Issue(NOTHING_IN_COMMON, message))
+    elif _are_apart(editions):
+        message = (
+            f"{editions.before.name} and {editions.after.name} have no land in common: what was "
+            "found again lies elsewhere. Do the layers show the same place?"
+        )
+        issues.append(Issue(NOTHING_IN_COMMON, message))
     return issues
+
+
+def _are_apart(editions: Editions) -> bool:
+    """Whether the extents of both states do not meet."""
+    before, after = (
+        shapely.box(*shapely.total_bounds(e.polygons)) for e in (editions.before, editions.after)
+    )
+    return not shapely.intersects(before, after)
 
 
 def _carried(

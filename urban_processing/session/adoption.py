@@ -6,9 +6,8 @@ import dataclasses
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 
-from urban_processing.assembly import assemble_layout
+from urban_processing.assembly import assemble_layout, kept_of
 from urban_processing.errors import BoundaryError, EditError
 from urban_processing.hashing import child
 from urban_processing.layout import (
@@ -19,8 +18,8 @@ from urban_processing.layout import (
     Stage,
     Steering,
 )
-from urban_processing.mesh.places import segments_on, vertices_at
-from urban_processing.mesh.planar import BoolArray, IntArray, PlanarMesh
+from urban_processing.mesh.places import edges_on
+from urban_processing.mesh.planar import IntArray
 from urban_processing.pipelines.hand_edits import ParcelMatch, match_parcels
 from urban_processing.pipelines.levels import State
 from urban_processing.session.moment import PARTS_OF_CUT, Moment
@@ -68,8 +67,7 @@ def adopt(
             streets,
             frame=before.frame,
             snap=snap,
-            min_area=before.min_area,
-            obstacles=before.obstacles,
+            kept=kept_of(before),
         )
     except BoundaryError as error:
         raise EditError(error.problems) from error
@@ -84,49 +82,28 @@ def adopt(
 
 
 def _with_edges(before: Layout, drawn: Layout, snap: float) -> Layout:
-    """The layout before on the drawn mesh, with what is known of its edges and vertices."""
-    mesh, old = drawn.mesh, before.mesh
+    """The drawn layout with what is known of streets that were there, are new, or are gone."""
+    mesh, street = drawn.mesh, drawn.edge_street
     fixed, level = drawn.edge_fixed.copy(), drawn.edge_level.copy()
-    edge, of = _edges_on(mesh, old, before.edge_street, snap)
+    edge, of = edges_on(mesh, before.mesh, before.edge_street, 2 * snap)
     known = np.zeros(mesh.n_edges, dtype=bool)
     known[edge] = True
     fixed[edge], level[edge] = before.edge_fixed[of], before.edge_level[of]
-    street = drawn.edge_street
-    new = street & ~known
+    new, gone = street & ~known, known & ~street
     fixed[new] = len(before.fixed_streets)
-    gone = known & ~street
-    steering = np.zeros(mesh.n_edges, dtype=np.uint8)
-    edge, of = _edges_on(mesh, old, before.edge_steering != Steering.NONE, snap)
-    steering[edge] = before.edge_steering[of]
+    steering = drawn.edge_steering.copy()
     steering[street] &= ~np.uint8(Steering.NO_STREET)
     steering[new] |= np.uint8(Steering.KEPT)
     steering[gone] |= np.uint8(Steering.NO_STREET)
-    given = before.corners_given
-    places = old.xy[before.vertex_corner]
+    given = before.fixed_streets
     return drawn.replace(
-        vertex_corner=vertices_at(mesh.xy, places) if given else drawn.vertex_corner,
-        vertex_entry=vertices_at(mesh.xy, old.xy[before.vertex_entry]),
         edge_fixed=np.where(street, fixed, NOT_FIXED),
         edge_level=np.where(street, level, -1).astype(np.int16),
         edge_steering=steering,
-        street_rules=before.street_rules,
-        corners_given=given,
-        issues=before.issues,
-        history=before.history,
-        input_parts=before.input_parts,
-        fixed_streets=(*before.fixed_streets, GivenStreet()) if new.any() else before.fixed_streets,
+        fixed_streets=(*given, GivenStreet()) if new.any() else given,
         land_uses=before.land_uses,
+        issues=before.issues,
     )
-
-
-def _edges_on(
-    mesh: PlanarMesh, old: PlanarMesh, chosen: BoolArray, snap: float
-) -> tuple[IntArray, IntArray]:
-    """Edges of a mesh that lie on chosen edges of another one, and on which."""
-    some = np.flatnonzero(chosen)
-    lines = shapely.linestrings(old.xy[old.origin.reshape(-1, 2)[some]])
-    on, edge = segments_on(mesh.xy[mesh.origin.reshape(-1, 2)], lines, 2 * snap)
-    return edge, some[on]
 
 
 def _with_faces(layout: Layout, before: Layout, match: ParcelMatch) -> Layout:

@@ -15,6 +15,7 @@ from urban_processing.layout import GivenStreet
 from urban_processing.pipelines import levels
 from urban_processing.pipelines.cogenerate import go_on
 from urban_processing.pipelines.levels import State
+from urban_processing.pipelines.stops import BLOCKS_DIVIDED, LEVEL
 from urban_processing.progress import Progress
 from urban_processing.session import adoption, parcel_edits, street_edits
 from urban_processing.session.moment import Moment
@@ -255,8 +256,8 @@ class Finish(Edit):
         after = dataclasses.replace(
             moment.state,
             layout=layout,
-            level=int(results[levels.LEVEL]),
-            blocks_divided=bool(results[levels.BLOCKS_DIVIDED]),
+            level=int(results[LEVEL]),
+            blocks_divided=bool(results[BLOCKS_DIVIDED]),
             completed=True,
         )
         return after, f"Finished: {layout.mesh.n_faces:,} parcels"

@@ -14,14 +14,8 @@ import shapely
 from urban_processing.errors import EditError, UrbanError
 from urban_processing.layout import Layout
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.pipelines.levels import (
-    ALGORITHM,
-    State,
-    begin,
-    progress_of,
-    state_of,
-    with_streets,
-)
+from urban_processing.pipelines.levels import State, begin, with_streets
+from urban_processing.pipelines.stops import ALGORITHM, progress_of, state_of
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
 from urban_processing.session import files

@@ -1,4 +1,4 @@
-"""How QGIS answers while a layout is steered: ``python -m tests.benchmarks.steering``.
+"""How QGIS answers while a layout is steered: ``python -m tests.benchmarks.dock``.
 
 Steers a sample boundary through all its levels in the dock, in a window that is drawn offscreen,
 with an edit after the last level, and prints for each thing that a planner does how long it
