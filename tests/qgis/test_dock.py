@@ -141,6 +141,7 @@ def plugin(provider: Any, qgis_iface: Any, qgis_new_project: None) -> Iterator[A
     yield made
     made.provider = None
     made.unload()
+    qgis_iface.newProject()
     for _ in range(3):
         QCoreApplication.processEvents()
 
