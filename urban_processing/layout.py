@@ -81,6 +81,16 @@ NOT_FIXED = -1
 """`Layout.edge_fixed` of edges that are no street of the user's."""
 
 
+SHAPING = ("mesh", "vertex_", "edge_")
+"""What the names of fields that parcels and streets are made of begin with."""
+
+DERIVED = frozenset(
+    {"corner_graph", "chain_street", "chain_kind", "chain_fixed", "frontage", "face_block"}
+    | {"rim_parcel", "digest"}
+)
+"""What is worked out of those fields alone, and stays known when others change."""
+
+
 @dataclass(frozen=True, eq=False)
 class Layout:
     """Parcels and streets on one planar mesh; immutable.
@@ -177,7 +187,11 @@ class Layout:
 
     def replace(self, **changes: Any) -> Layout:
         """Return a copy with some fields changed."""
-        return dataclasses.replace(self, **changes)
+        other = dataclasses.replace(self, **changes)
+        if not any(name.startswith(SHAPING) for name in changes):
+            known = vars(self).keys() & DERIVED
+            vars(other).update({name: vars(self)[name] for name in known})
+        return other
 
     def with_mesh(self, mesh: PlanarMesh, remap: Remap) -> Layout:
         """Return the layout on an edited mesh; everything known follows the `Remap`."""

@@ -27,8 +27,10 @@ def divided(quota: IntArray, parent: IntArray, area: FloatArray) -> IntArray:
     """Divide the quotas of cut faces over their pieces in proportion to the area; 0 stays 0."""
     order = np.argsort(parent, kind="stable")
     start = np.flatnonzero(np.diff(parent[order], prepend=-1))
+    stop = np.append(start[1:], len(order))
     out = quota[parent]
-    for pieces in np.split(order, start[1:]):
-        if len(pieces) > 1 and quota[parent[pieces[0]]] > 0:
-            out[pieces] = shared_out(area[pieces], int(quota[parent[pieces[0]]]))
+    several = np.flatnonzero((stop - start > 1) & (out[order[start]] > 0))
+    for k in several.tolist():
+        pieces = order[start[k] : stop[k]]
+        out[pieces] = shared_out(area[pieces], int(quota[parent[pieces[0]]]))
     return out

@@ -94,9 +94,9 @@ def reported_polygons(xy: FloatArray, offsets: IntArray) -> tuple[IntArray, IntA
     return thin_corners(xy, kept, np.searchsorted(kept, offsets))
 
 
-def reported_corners(mesh: PlanarMesh) -> tuple[IntArray, IntArray]:
-    """Corners of the `reported_polygons` of all faces, as ragged vertices of the mesh."""
-    half_edges, offsets = mesh.face_rings()
+def reported_corners(mesh: PlanarMesh, faces: IntArray | None = None) -> tuple[IntArray, IntArray]:
+    """Corners of the `reported_polygons` of faces, by default all, as ragged mesh vertices."""
+    half_edges, offsets = mesh.face_rings(faces)
     vertex = mesh.origin[half_edges]
     corners, corner_offsets = reported_polygons(mesh.xy[vertex], offsets)
     return vertex[corners], corner_offsets

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,7 +61,10 @@ class Start:
 
 def start_with_land(site: Site, params: CogenerateParams) -> Start:
     """The start of a session with land."""
-    return Start("land", site.input_sha256, site.frame.crs, dict(params.as_dict()))
+    sha256 = site.input_sha256
+    if len(site.corners):  # which the hash of the land says nothing of
+        sha256 = hashlib.sha256(sha256.encode() + site.corners.tobytes()).hexdigest()
+    return Start("land", sha256, site.frame.crs, dict(params.as_dict()))
 
 
 def start_with_layout(layout: Layout, params: CogenerateParams) -> Start:
@@ -82,6 +86,8 @@ class Saved:
         For each edit, the number of the one that it followed, counted from 1; 0 is the beginning.
     current
         Number of the edit that was the last one; 0 if none was.
+    redo
+        Number of the edit that redo led to in the end; `current` if nothing was undone there.
     start
         What the session began with; None where the file does not say.
     result
@@ -94,6 +100,7 @@ class Saved:
     edits: tuple[Edit, ...]
     after: tuple[int, ...]
     current: int
+    redo: int
     start: Start | None
     result: dict[str, Any]
     software: str
@@ -109,7 +116,9 @@ class Saved:
 
     def check_start(self, start: Start) -> None:
         """Raise `EditError` unless the edits were made on what is there."""
-        if self.start is None or self.start.sha256 == start.sha256:
+        if self.start is None:
+            return
+        if (self.start.sha256, self.start.crs) == (start.sha256, start.crs):
             return
         what = "the land is" if self.start.kind == "land" else "the layout is"
         if self.start.kind != start.kind:
@@ -176,7 +185,7 @@ def save(path: str | PathLike[str], saved: dict[str, Any], *, overwrite: bool) -
 
 
 def as_json(
-    start: Start, edits: Sequence[tuple[Edit, int]], *, current: int, layout: Layout
+    start: Start, edits: Sequence[tuple[Edit, int]], *, current: int, redo: int, layout: Layout
 ) -> dict[str, Any]:
     """Put a session into the form that is saved.
 
@@ -186,6 +195,8 @@ def as_json(
         What was done, each with the number of the edit that it followed; 0 is the beginning.
     current
         Number of the edit that is the last one now.
+    redo
+        Number of the edit that redo leads to in the end.
     layout
         The layout as it is now.
     """
@@ -205,6 +216,8 @@ def as_json(
     }
     if current != len(rows):
         saved["current"] = current
+    if redo != current:
+        saved["redo"] = redo
     return saved
 
 
@@ -218,7 +231,7 @@ def read(path: str | PathLike[str]) -> Saved:
     """
     source = Path(path)
     try:
-        content = json.loads(source.read_text("utf-8"))
+        content = json.loads(source.read_text("utf-8-sig"))  # some editors write a mark first
     except FileNotFoundError:
         raise EditError(f"The file {source} does not exist.") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -257,11 +270,17 @@ def _saved(source: Path, content: dict[str, Any]) -> Saved:
         except EditError as error:
             problems += [f"{source}, edit {number}: {problem}" for problem in error.problems]
     current = content.get("current", len(content["edits"]))
-    if not isinstance(current, int) or not 0 <= current <= len(content["edits"]):
-        problems.append(f"{source}: current must be the number of an edit; it is {current!r}.")
+    redo = content.get("redo", current)
+    for name, value in {"current": current, "redo": redo}.items():
+        if not _is_number(value) or not 0 <= value <= len(content["edits"]):
+            problems.append(f"{source}: {name} must be the number of an edit; it is {value!r}.")
+            break
     start = content.get("start")
     if start is not None and not _is_start(start):
         problems.append(f"{source}: start does not say what the session began with.")
+    result = content.get("result", {})
+    if not isinstance(result, dict) or not _is_number(result.get("parcels", 0)):
+        problems.append(f"{source}: result does not say how many parcels the edits led to.")
     if problems:
         raise EditError(problems)
     return Saved(
@@ -269,8 +288,9 @@ def _saved(source: Path, content: dict[str, Any]) -> Saved:
         edits=tuple(edits),
         after=tuple(after),
         current=current,
+        redo=redo,
         start=None if start is None else Start(**start),
-        result=dict(content.get("result", {})),
+        result=dict(result),
         software=str(content.get("software", "unknown")),
     )
 
@@ -280,10 +300,14 @@ def _edit(row: Any, number: int) -> tuple[Edit, int]:
     if not isinstance(row, dict) or not isinstance(row.get("edit"), str):
         raise EditError('must be an object with its name, as in {"edit": "step"}.')
     after = row.get("after", number - 1)
-    if not isinstance(after, int) or not 0 <= after < number:
+    if not _is_number(after) or not 0 <= after < number:
         raise EditError(f"after must be the number of an edit before it; it is {after!r}.")
     values = {key: value for key, value in row.items() if key not in ("edit", "after")}
     return make_edit(row["edit"], values), after
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _is_start(start: Any) -> bool:
@@ -291,5 +315,7 @@ def _is_start(start: Any) -> bool:
         isinstance(start, dict)
         and set(start) == {"kind", "sha256", "crs", "parameters"}
         and start["kind"] in ("land", "layout")
+        and isinstance(start["sha256"], str)
+        and isinstance(start["crs"], str)
         and isinstance(start["parameters"], dict)
     )

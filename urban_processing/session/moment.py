@@ -13,6 +13,7 @@ from urban_processing.errors import EditError
 from urban_processing.hashing import child
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.pipelines.levels import State
+from urban_processing.session.model import Candidate
 
 PARTS_OF_CUT = (0, 1)
 """Ranks of the halves of a cut parcel among its parts, as `hashing.child` counts them."""
@@ -49,6 +50,11 @@ class Moment:
     @cached_property
     def _tree(self) -> shapely.STRtree:
         return shapely.STRtree(self.state.layout.mesh.face_polygons())
+
+    @cached_property
+    def cuts(self) -> dict[int, tuple[Candidate, ...]]:
+        """Candidate cuts of faces, as far as they were asked for."""
+        return {}
 
     def number(self, face: int) -> int:
         """Number of a face's parcel."""

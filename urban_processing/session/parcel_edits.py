@@ -32,6 +32,12 @@ Edited = tuple[State, str]
 
 def cuts_of(moment: Moment, face: int) -> tuple[Candidate, ...]:
     """Candidate cuts of a parcel; none where it is locked, too small, or around a lake."""
+    if face not in moment.cuts:
+        moment.cuts[face] = _cuts(moment, face)
+    return moment.cuts[face]
+
+
+def _cuts(moment: Moment, face: int) -> tuple[Candidate, ...]:
     layout = moment.state.layout
     barred = layout.face_locked[face] or layout.mesh.face_n_loops[face] > 1
     too_small = layout.mesh.face_area[face] < 2.0 * moment.state.floor
@@ -55,7 +61,8 @@ def choose(moment: Moment, face: int, rank: int) -> Edited:
     )
     if not done[0]:
         raise EditError(f"Candidate {rank} of parcel {number} leaves no two legal halves.")
-    cut = remove_short_edges(with_kept_cuts(cut, parent), min_area=state.floor)
+    halves = np.flatnonzero(parent == face)
+    cut = remove_short_edges(with_kept_cuts(cut, parent), min_area=state.floor, faces=halves)
     small, large = chosen.areas
     sentence = f"Parcel {number} was cut into halves of {small:,.0f} and {large:,.0f} m²"
     quota = divided(state.layout.face_quota, parent, cut.mesh.face_area)

@@ -11,6 +11,9 @@ import shapely
 
 from urban_processing.errors import EditError
 
+LARGEST = 1e9
+"""No distance on the map is as large, in metres."""
+
 MIN_RING = 3
 """Places that a ring has at least."""
 
@@ -34,7 +37,7 @@ def number_or_none(value: Any) -> float | None:
 def number(value: Any) -> float:
     """A number of metres, not negative."""
     known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not known or not math.isfinite(value) or value < 0:
+    if not known or not 0 <= value <= LARGEST:
         raise EditError(f"must be a number of metres, 0 or more; it is {value!r}.")
     return float(value)
 
@@ -127,7 +130,7 @@ def _coordinates(value: Any) -> np.ndarray:
     coords = getattr(value, "coords", value)
     try:
         xy = np.asarray(list(coords), dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         xy = np.full(1, math.nan)
     if not np.isfinite(xy).all():
         raise EditError("must be finite coordinates.")

@@ -18,6 +18,7 @@ from urban_processing.pipelines.levels import State, begin, with_streets
 from urban_processing.pipelines.stops import ALGORITHM, progress_of, state_of
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
+from urban_processing.rebuild import canonical
 from urban_processing.session import files
 from urban_processing.session.edits import Edit, make_edit
 from urban_processing.session.figures import figures
@@ -59,7 +60,6 @@ class Session:
     def __init__(self, state: State, start: files.Start) -> None:
         self._start = start
         self._timeline = Timeline.beginning(first_moment(state), start.sentence)
-        self._candidates: tuple[Moment, dict[int, tuple[Candidate, ...]]] | None = None
         self._shown: tuple[Moment, int, Layout] | None = None
 
     @classmethod
@@ -95,8 +95,9 @@ class Session:
         BoundaryError
             If co-generation did not make it.
         """
-        state = state_of(layout)
-        return cls(state, files.start_with_layout(layout, state.params))
+        # numbered by the parcels alone, so that the layout's file is the same start
+        state = state_of(canonical(layout))
+        return cls(state, files.start_with_layout(state.layout, state.params))
 
     # what there is now
 
@@ -180,13 +181,7 @@ class Session:
         neighbour's cut of the same level ends.
         """
         moment = self._moment
-        if self._candidates is None or self._candidates[0] is not moment:
-            self._candidates = moment, {}
-        known = self._candidates[1]
-        face = face_of(moment, read_parcel(parcel))
-        if face not in known:
-            known[face] = cuts_of(moment, face)
-        return known[face]
+        return cuts_of(moment, face_of(moment, read_parcel(parcel)))
 
     # edits
 
@@ -302,6 +297,7 @@ class Session:
         before = self._moment
         after, sentence = _applied(before, edit, progress)
         self._timeline.add(edit, after, sentence)
+        before.cuts.clear()  # they take memory, and are found again if somebody comes back
         return _change(before, after, sentence)
 
     @staticmethod
@@ -333,13 +329,13 @@ class Session:
     def branches(self) -> tuple[Branch, ...]:
         """The ends of all that was done, also of what was undone and gone on from otherwise."""
         timeline = self._timeline
-        path = timeline.path()
+        last = timeline.last()
         return tuple(
             Branch(
                 number=tip,
                 sentence=timeline.entries[tip].sentence,
                 edits=len(timeline.path(tip)) - 1,
-                current=timeline.now in timeline.path(tip) and _follows(timeline, path, tip),
+                current=tip == last,
             )
             for tip in timeline.tips()
         )
@@ -370,7 +366,10 @@ class Session:
         done = [
             (entry.edit, entry.before) for entry in self._timeline.entries if entry.edit is not None
         ]
-        saved = files.as_json(self._start, done, current=self._timeline.now, layout=self.layout)
+        timeline = self._timeline
+        saved = files.as_json(
+            self._start, done, current=timeline.now, redo=timeline.last(), layout=self.layout
+        )
         return files.save(path, saved, overwrite=overwrite)
 
     @classmethod
@@ -428,6 +427,7 @@ class Session:
                 where = f"{saved.path}, edit {i + 1} ({edit.name})"
                 raise EditError(f"{where}: {problem}" for problem in error.problems) from error
             numbers.append(self._timeline.now)
+        self._timeline.go_to(numbers[saved.redo])
         self._timeline.go_to(numbers[saved.current])
 
 
@@ -449,11 +449,3 @@ def _change(before: Moment, after: Moment, sentence: str) -> Change:
 
 def _in_clause(sentence: str) -> str:
     return sentence[:1].lower() + sentence[1:]
-
-
-def _follows(timeline: Timeline, path: list[int], tip: int) -> bool:
-    """Whether redo leads from the end of a path to a tip."""
-    at = path[-1]
-    while at in timeline.ahead and at != tip:
-        at = timeline.ahead[at]
-    return at == tip

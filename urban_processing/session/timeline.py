@@ -69,6 +69,13 @@ class Timeline:
             at = self.entries[at].before
         return line[::-1]
 
+    def last(self) -> int:
+        """Number of the entry that redo leads to in the end, from now."""
+        at = self.now
+        while at in self.ahead:
+            at = self.ahead[at]
+        return at
+
     def tips(self) -> list[int]:
         """Numbers of the entries after which nothing was done: the end of each branch."""
         followed = {entry.before for entry in self.entries}

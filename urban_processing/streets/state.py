@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -67,8 +66,8 @@ class StreetState:
         self.length: list[float] = graph.length.tolist()
         size = np.round(graph.length / (self.side * QUANTUM)) * QUANTUM
         self.size: list[float] = size.tolist()
-        self.out = _ragged(graph.out, graph.out_offsets)
-        self.around = _ragged(graph.around, graph.around_offsets)
+        self.out = _Ragged(graph.out, graph.out_offsets)
+        self.around = _Ragged(graph.around, graph.around_offsets)
         self.ahead, self.aside, self.follow = _successors(graph, usable)
         streets = np.flatnonzero(layout.chain_street)
         self.degree: list[int] = np.bincount(graph.start[streets], minlength=graph.n_nodes).tolist()
@@ -188,7 +187,7 @@ class StreetState:
     def blocks(self) -> IntArray:
         """(F,) block of each parcel: what the streets enclose together."""
         graph = self.graph
-        n = len(self.around)
+        n = self.layout.mesh.n_faces
         left, right = graph.face[0::2], graph.face[1::2]
         open_ = ~self.street_mask()[0::2] & (left != OUTSIDE) & (right != OUTSIDE)
         links = coo_matrix((np.ones(int(open_.sum())), (left[open_], right[open_])), shape=(n, n))
@@ -230,14 +229,20 @@ def quantised(cost: float) -> float:
     return round(cost / QUANTUM) * QUANTUM
 
 
-def _ragged(values: IntArray, offsets: IntArray) -> list[list[int]]:
-    flat: list[int] = values.tolist()
-    return [flat[a:b] for a, b in pairwise(offsets.tolist())]
+class _Ragged(dict[int, list[int]]):
+    """Lists by their place in ragged arrays; each is made when it is first asked for."""
+
+    def __init__(self, values: IntArray, offsets: IntArray) -> None:
+        super().__init__()
+        self._values: list[int] = values.tolist()
+        self._offsets: list[int] = offsets.tolist()
+
+    def __missing__(self, place: int) -> list[int]:
+        found = self[place] = self._values[self._offsets[place] : self._offsets[place + 1]]
+        return found
 
 
-def _successors(
-    graph: CornerGraph, usable: BoolArray
-) -> tuple[list[list[int]], list[list[int]], list[int]]:
+def _successors(graph: CornerGraph, usable: BoolArray) -> tuple[_Ragged, _Ragged, list[int]]:
     """Usable chains that continue each chain straight on and with a turn; the straightest."""
     n = graph.n_chains
     counts = np.diff(graph.out_offsets)[graph.end]
@@ -254,8 +259,8 @@ def _successors(
     order = order[straight[order]]
     follow[before[order]] = after[order]
     bounds = np.arange(n + 1)
-    ahead = _ragged(after[straight], np.searchsorted(before[straight], bounds))
-    aside = _ragged(after[~straight], np.searchsorted(before[~straight], bounds))
+    ahead = _Ragged(after[straight], np.searchsorted(before[straight], bounds))
+    aside = _Ragged(after[~straight], np.searchsorted(before[~straight], bounds))
     return ahead, aside, follow.tolist()
 
 

@@ -7,6 +7,8 @@ begins or ends on the graph of its part, once there is one.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from urban_processing.layout import EdgeKind, Layout, Steering
@@ -23,9 +25,12 @@ def usable_edges(layout: Layout) -> BoolArray:
     return np.asarray(free | layout.edge_street)
 
 
+@lru_cache(maxsize=2)
 def edge_networks(layout: Layout) -> IntArray:
     """(E,) connected piece of the graph of usable edges; `BARE` for the others."""
     mesh = layout.mesh
     on = usable_edges(layout)
     label = components(mesh.n_vertices, mesh.origin.reshape(-1, 2)[on])
-    return np.where(on, label[mesh.origin[0::2]], BARE)
+    found = np.where(on, label[mesh.origin[0::2]], BARE)
+    found.flags.writeable = False
+    return found

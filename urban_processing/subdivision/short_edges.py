@@ -18,7 +18,7 @@ from urban_processing.mesh.corners import (
     ring_areas,
 )
 from urban_processing.mesh.edit import MeshEditor
-from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, linear_rings
+from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, linear_rings
 
 SHORT_SHARE = 0.2
 """An edge is short below this share of the mean side of either parcel (Chen 2024, 4.1)."""
@@ -42,13 +42,22 @@ class _Merge:
     faces: list[int]
 
 
-def remove_short_edges(layout: Layout, *, min_area: float) -> Layout:
+def remove_short_edges(layout: Layout, *, min_area: float, faces: IntArray | None = None) -> Layout:
     """Merge the ends of short parcel sides; the sides that meet there follow.
 
     A merge is done only if all parcels around stay simple, at or above `min_area`, no less
     regular by more than `IRREGULARITY_RISE` each, and the rim of the land keeps its shape.
+
+    Parameters
+    ----------
+    layout
+        Parcels and streets.
+    min_area
+        Smallest area in m² that a merge may leave of a parcel that is not smaller.
+    faces
+        Parcels whose sides are looked at; by default all.
     """
-    chains = _short_chains(layout)
+    chains = _short_chains(layout, faces)
     if not chains:
         return layout
     merger = _Merger(layout, min_area)
@@ -60,18 +69,25 @@ def remove_short_edges(layout: Layout, *, min_area: float) -> Layout:
     return layout.with_mesh(*merger.editor.commit())
 
 
-def _short_chains(layout: Layout) -> list[list[int]]:
-    """Chains of half-edges that are too short, the shortest first."""
+def _short_chains(layout: Layout, faces: IntArray | None) -> list[list[int]]:
+    """Chains of half-edges around some faces that are too short, the shortest first."""
     graph = layout.corner_graph
-    corners, corner_offsets = reported_corners(layout.mesh)
-    side = mean_side_length(layout.mesh.xy[corners], corner_offsets)
-    with_outside = np.append(side, np.inf)
-    least = np.minimum(with_outside[graph.face[0::2]], with_outside[graph.face[1::2]])
-    ratio = graph.length[0::2] / least
+    sides = graph.face.reshape(-1, 2)
+    among = np.arange(len(sides))
+    beside = np.arange(layout.mesh.n_faces)
+    if faces is not None:
+        among = np.flatnonzero(np.isin(sides, faces).any(axis=1))
+        beside = np.setdiff1d(sides[among], [OUTSIDE])
+    if not len(among):
+        return []
+    corners, corner_offsets = reported_corners(layout.mesh, beside)
+    side = np.full(layout.mesh.n_faces + 1, np.inf)
+    side[beside] = mean_side_length(layout.mesh.xy[corners], corner_offsets)
+    ratio = graph.length[0::2][among] / side[sides[among]].min(axis=1)
     short = np.flatnonzero(ratio < SHORT_SHARE)
     short = short[np.argsort(np.round(ratio[short], 9), kind="stable")]
     o = graph.offsets
-    return [graph.half_edges[o[2 * i] : o[2 * i + 1]].tolist() for i in short]
+    return [graph.half_edges[o[2 * i] : o[2 * i + 1]].tolist() for i in among[short].tolist()]
 
 
 class _Merger:
