@@ -28,6 +28,7 @@ from urban_processing.errors import EditError
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
 from urban_processing.params.cogenerate import CogenerateParams
+from urban_processing.params.optimize import OptimizeParams
 from urban_processing.progress import Progress
 from urban_processing.session.session import Session
 from urban_processing.site import Site
@@ -114,10 +115,6 @@ class Bench:
         none = f"Parcel {parcel} is too small to be cut, or no cut of it is allowed."
         return Hovered(parcel, outline, options, "" if options else none)
 
-    def outlines(self, parcels: Sequence[int]) -> tuple[Hovered, ...]:
-        """Return the outlines of some parcels."""
-        return tuple(Hovered(p, self.seen.parcels[p].outline) for p in parcels)
-
 
 def bench_for(
     start: Start,
@@ -139,7 +136,7 @@ def bench_for(
 
 def _start(start: Start, algorithm: Any, context: QgsProcessingContext) -> Site | Layout:
     if start.layout_file:
-        return read_layout(start.layout_file, library=OGR)
+        return read_layout(start.layout_file, library=OGR, snap=OptimizeParams.snap)
     params = CogenerateParams.from_values(start.values, _given(start))
     sources = Sources(algorithm, start.layers, context, QgsProcessingFeedback(), params)
     site: Site = sources.read()["boundary"]

@@ -11,7 +11,7 @@ from qgis.PyQt.QtCore import pyqtSignal
 
 from qgis_plugin import dependencies
 from qgis_plugin.steering.loading import load_layers
-from qgis_plugin.steering.model import Place, Start, View
+from qgis_plugin.steering.model import Hovered, Place, Start, View
 from qgis_plugin.steering.running import Runner
 from qgis_plugin.steering.worker import Job
 from qgis_plugin.texts import tr
@@ -150,6 +150,13 @@ class Steering(Runner):
                 latest=_HOVER,
             )
         )
+
+    def pick(self, place: Place, then: Callable[[Hovered | None], None]) -> None:
+        """Ask for the parcel at a place that was clicked, and go on with it."""
+        bench = self._bench
+        if bench is None or self.is_busy:
+            return
+        self.worker.ask(Job(lambda _: bench.hovered(place, with_options=False), then, self._refuse))
 
     # results
 

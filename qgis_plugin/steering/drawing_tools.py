@@ -31,7 +31,6 @@ class MergeTool(SteeringTool):
     def __init__(self, canvas: QgsMapCanvas, steering: Steering) -> None:
         super().__init__(canvas, steering)
         self.chosen: dict[int, Hovered] = {}
-        self._clicked: Place | None = None
         self.marks = QgsRubberBand(canvas, QgsWkbTypes.GeometryType.PolygonGeometry)
         self.marks.setStrokeColor(OUTLINE)
         self.marks.setFillColor(_CHOSEN)
@@ -42,19 +41,15 @@ class MergeTool(SteeringTool):
         if event.button() == Qt.MouseButton.RightButton:
             self.finish()
             return
-        self._clicked = self.place(event.mapPoint())
-        if self._clicked is not None:
-            self.steering.hover(self._clicked, with_options=False)
+        clicked = self.place(event.mapPoint())
+        if clicked is not None:
+            self.steering.pick(clicked, self._toggle)
 
-    def show_hovered(self, hovered: Hovered | None) -> None:
-        """Outline the parcel under the cursor, and mark it if it was clicked."""
-        super().show_hovered(hovered)
-        if hovered is None or self._clicked is None:
-            return
-        if geometry(hovered.outline).contains(QgsPointXY(*self._clicked)):
-            if self.chosen.pop(hovered.parcel, None) is None:
-                self.chosen[hovered.parcel] = hovered
-            self._clicked = None
+    def _toggle(self, picked: Hovered | None) -> None:
+        """Mark a parcel that was clicked, or take its mark away."""
+        if picked is not None:
+            if self.chosen.pop(picked.parcel, None) is None:
+                self.chosen[picked.parcel] = picked
             self._mark()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -73,7 +68,6 @@ class MergeTool(SteeringTool):
 
     def reset(self) -> None:
         """Forget what was clicked."""
-        self._clicked = None
         self.chosen.clear()
         self._mark()
         super().reset()

@@ -12,8 +12,7 @@ from qgis.core import QgsFeature, QgsFields, QgsGeometry
 
 from qgis_plugin.steering.fields import DONE, LOCKED, TO_CUT, parcel_fields, street_fields
 from qgis_plugin.steering.model import Difference, StreetKey
-from urban_processing.layout import Layout, Stage
-from urban_processing.mesh.planar import BoolArray
+from urban_processing.layout import Layout
 from urban_processing.session.session import Session
 from urban_processing.streets.network import street_network
 
@@ -77,7 +76,8 @@ def _new(before: Mapping[K, V], after: Mapping[K, V], *, whole: bool) -> Mapping
 
 def _parcels(layout: Layout, session: Session) -> dict[int, ParcelLook]:
     outlines = shapely.to_wkb(layout.mesh.face_polygons(layout.frame.origin)).tolist()
-    states = np.where(layout.face_locked, LOCKED, np.where(_may_be_cut(layout), TO_CUT, DONE))
+    to_cut = np.isin(session.parcels, session.to_cut)
+    states = np.where(layout.face_locked, LOCKED, np.where(to_cut, TO_CUT, DONE))
     return {
         number: ParcelLook(outline, state, layout.land_uses[use], area)
         for number, outline, state, use, area in zip(
@@ -89,14 +89,6 @@ def _parcels(layout: Layout, session: Session) -> dict[int, ParcelLook]:
             strict=True,
         )
     }
-
-
-def _may_be_cut(layout: Layout) -> BoolArray:
-    """(F,) parcels that co-generation goes on with, as far as their size tells."""
-    open_ = layout.face_stage != Stage.DONE
-    if layout.face_quota.any():
-        return np.asarray(open_ & (layout.face_quota >= 2))
-    return np.asarray(open_ & (layout.mesh.face_area >= 2.0 * layout.min_area))
 
 
 def _streets(layout: Layout) -> dict[StreetKey, int | None]:

@@ -88,10 +88,10 @@ class State:
     @property
     def finished(self) -> bool:
         """Whether no level is to come any more."""
-        return not self.divides_blocks and not len(self._left())
+        return not self.divides_blocks and not len(self.left_to_cut())
 
-    def _left(self) -> IntArray:
-        """Parcels that this or a later level cuts."""
+    def left_to_cut(self) -> IntArray:
+        """Parcels that the next or a later level cuts along streamlines, as they are now."""
         return self._large_enough(Stage.OPEN, Stage.BEHIND, Stage.AHEAD)
 
     @property
@@ -99,7 +99,7 @@ class State:
         """Whether the next level divides the blocks by another strategy than streamlines."""
         if self.blocks_divided or self.params.strategy is Strategy.STREAMLINE:
             return False
-        return not len(self._left())
+        return not len(self.left_to_cut())
 
 
 def smallest_area(site: Site, params: CogenerateParams) -> float:

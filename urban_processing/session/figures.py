@@ -14,7 +14,7 @@ from urban_processing.pipelines.levels import State
 def figures(state: State) -> dict[str, float]:
     """Return what a planner looks at while steering.
 
-    ``parcels``, how many of them the next level cuts (``to_cut``) and no street reaches
+    ``parcels``, how many of them levels to come cut (``to_cut``) and no street reaches
     (``unreached``); mean and least area; mean irregularity (Chen 2024, Eq. 1) and the share of
     parcels with four sides; length of the streets inside the land in km, their junctions with
     each other and the rim, and their ends.
@@ -28,7 +28,7 @@ def figures(state: State) -> dict[str, float]:
     has_inner = inner_degree > 0
     return {
         "parcels": float(mesh.n_faces),
-        "to_cut": float(len(next_to_cut(state))),
+        "to_cut": float(len(left_to_cut(state))),
         "unreached": float(len(unreached_parcels_of(layout))),
         "mean_area_m2": float(mesh.face_area.mean()),
         "least_area_m2": float(mesh.face_area.min()),
@@ -40,9 +40,11 @@ def figures(state: State) -> dict[str, float]:
     }
 
 
-def next_to_cut(state: State) -> IntArray:
-    """Faces that the next level cuts, or divides together with the rest of their block."""
-    return np.flatnonzero(~state.layout.face_locked) if state.divides_blocks else state.to_cut()
+def left_to_cut(state: State) -> IntArray:
+    """Faces that levels to come cut, or divide together with the rest of their block."""
+    if state.divides_blocks:
+        return np.flatnonzero(~state.layout.face_locked)
+    return state.left_to_cut()
 
 
 def _degree(edges: np.ndarray, origin: np.ndarray, n_vertices: int) -> np.ndarray:

@@ -22,7 +22,7 @@ from urban_processing.provenance import Step
 from urban_processing.rebuild import canonical
 from urban_processing.session import files
 from urban_processing.session.edits import make_edit
-from urban_processing.session.figures import figures, next_to_cut
+from urban_processing.session.figures import figures, left_to_cut
 from urban_processing.session.history import History
 from urban_processing.session.model import Candidate, Change
 from urban_processing.session.moment import Moment, first_moment
@@ -145,9 +145,9 @@ class Session(History):
 
     @property
     def to_cut(self) -> tuple[int, ...]:
-        """Numbers of the parcels that the next level cuts, or divides with their blocks."""
+        """Numbers of the parcels that levels to come cut, or divide with their blocks."""
         moment = self._moment
-        return tuple(moment.number(face) for face in next_to_cut(moment.state).tolist())
+        return tuple(moment.number(face) for face in left_to_cut(moment.state).tolist())
 
     @property
     def parcels(self) -> tuple[int, ...]:
