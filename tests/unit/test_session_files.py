@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -12,12 +13,14 @@ import pytest
 import shapely
 from session_checks import fingerprint
 
+from urban_processing.algorithms.edit import EDIT
 from urban_processing.errors import Cancelled, EditError, OutputError, ParameterError
 from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.files import read_layout, write_layout
 from urban_processing.params import CogenerateParams
 from urban_processing.pipelines.cogenerate import cogenerate
 from urban_processing.progress import CallbackProgress
+from urban_processing.session.edits import KINDS
 from urban_processing.session.files import read
 from urban_processing.session.session import Session
 from urban_processing.site import Site
@@ -488,3 +491,12 @@ def test_branches_can_be_written_by_hand(land: Site, tmp_path: Path) -> None:
     session.replay(read(written(tmp_path, {"edits": edits, "current": 2})))
     assert session.layout.face_locked.tolist() == [True, False]
     assert [branch.edits for branch in session.branches()] == [2, 2]
+
+
+def test_the_description_of_edit_names_all_edits_and_what_they_take() -> None:
+    said = EDIT.description[EDIT.description.index("Edits, and what they take") :]
+    by_name = dict(part.strip().rstrip(".").partition(":")[::2] for part in said.split(";")[1:])
+    assert set(by_name) | {"step"} == set(KINDS)
+    for name, takes in by_name.items():
+        fields = [field.name for field in dataclasses.fields(KINDS[name])]
+        assert [word for word in fields if word in takes] == fields, name
