@@ -40,7 +40,7 @@ STREET_LEVEL, FIXED_ID = STREET_COLUMNS = tuple(
 VALUES_IGNORED = "values_ignored"
 """Code of the issue that says which values of a column mean nothing."""
 
-_LARGEST = 2**31
+_LARGEST, _HIGHEST_LEVEL = 2**31, 1000
 _HALVES = 2
 _TRUE, _FALSE = ("true", "t", "yes", "y", "1"), ("false", "f", "no", "n", "0")
 _PLACES = 1000.0
@@ -150,7 +150,7 @@ def parcel_rows(columns: Mapping[str, npt.NDArray[Any]], n: int) -> ParcelRows:
 
     return ParcelRows(
         np.arange(n),
-        said(LEVEL, _whole),
+        said(LEVEL, _level),
         said(USE, str),
         said(LOCKED, _truth),
         said(LINEAGE, _lineage),
@@ -174,12 +174,12 @@ def street_rows(columns: Mapping[str, npt.NDArray[Any]], n: int, *, n_given: int
     """
     issues: list[Issue] = []
 
-    def numbers(name: str, default: int) -> IntArray:
+    def numbers(name: str, default: int, meaning: Callable[[Any], int]) -> IntArray:
         what = f"Column {name} of the streets"
-        values = _said(columns.get(name), n, _whole, what=what, to=issues)
+        values = _said(columns.get(name), n, meaning, what=what, to=issues)
         return np.array(values.filled(default), dtype=np.int64)
 
-    level, fixed = numbers(STREET_LEVEL, -1), numbers(FIXED_ID, 0) - 1
+    level, fixed = numbers(STREET_LEVEL, -1, _level), numbers(FIXED_ID, 0, _whole) - 1
     return StreetRows(level, np.where(fixed < n_given, fixed, NOT_FIXED), tuple(issues))
 
 
@@ -340,6 +340,13 @@ def _whole(value: Any) -> int:
     if not 0 <= number < _LARGEST or number != math.floor(number):
         raise ValueError("no number of things")
     return int(number)
+
+
+def _level(value: Any) -> int:
+    level = _whole(value)
+    if level > _HIGHEST_LEVEL:
+        raise ValueError("no level")
+    return level
 
 
 def _truth(value: Any) -> bool:

@@ -27,15 +27,10 @@ from qgis_plugin.steering.picture import Picture, difference, picture_of
 from urban_processing.errors import EditError
 from urban_processing.layout import Layout
 from urban_processing.layout_file.files import read_layout
-from urban_processing.mesh.planar import FloatArray
 from urban_processing.params.cogenerate import CogenerateParams
 from urban_processing.progress import Progress
 from urban_processing.session.session import Session
 from urban_processing.site import Site
-
-_BEYOND = 0.05
-"""Metres by which drawn cuts are prolonged: an end that was snapped to a boundary crosses it,
-however its coordinates are rounded."""
 
 
 class Bench:
@@ -77,9 +72,9 @@ class Bench:
     def cut(self, line: Sequence[Place]) -> View:
         """Cut the parcel in which the middle of a drawn line lies."""
         middle = shapely.LineString(line).interpolate(0.5, normalized=True)
-        across = _prolonged(line, _BEYOND)
+        drawn = np.asarray(line, dtype=np.float64)
         return self.edit_parcel(
-            (middle.x, middle.y), lambda session, parcel: session.cut(parcel, across)
+            (middle.x, middle.y), lambda session, parcel: session.cut(parcel, drawn)
         )
 
     def add_street(self, line: Sequence[Place], *, follow: bool, width: float | None) -> View:
@@ -159,14 +154,3 @@ def _single(shapes: Sequence[bytes], kind: str) -> list[Any]:
     """Geometries of a kind, those of several pieces apart."""
     found = shapely.get_parts(shapely.from_wkb(list(shapes)))
     return [shape for shape in found if shape.geom_type == kind]
-
-
-def _prolonged(line: Sequence[Place], by: float) -> FloatArray:
-    """(n, 2) a line with both of its ends moved on straight."""
-    xy = np.asarray(line, dtype=np.float64)
-    for end, before in ((0, 1), (-1, -2)):
-        along = xy[end] - xy[before]
-        length = float(np.hypot(*along))
-        if length > 0:
-            xy[end] += by / length * along
-    return xy

@@ -62,8 +62,7 @@ class Steering(Runner):
         self.worker.close()
         self._job = self._changes = None
         self.layers.remove()
-        for owned in (self.layers, self.worker):
-            owned.deleteLater()
+        self.layers.deleteLater()
 
     # edits
 

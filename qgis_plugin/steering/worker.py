@@ -17,8 +17,8 @@ from urban_processing.progress import CallbackProgress, Progress
 _BETWEEN_REPORTS = 0.05
 """Seconds between two reports of progress: each wakes the window."""
 
-_LEFT: list[Worker] = []
-"""Workers whose thread still ran when they were closed: Qt objects must not die on a thread."""
+_CLOSED: list[Worker] = []
+"""Workers that were closed: objects of Qt must not die on a thread."""
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Worker(QObject):
     def __init__(self) -> None:
         super().__init__()
         self._told.connect(self._in_window, Qt.ConnectionType.QueuedConnection)
-        self._jobs: SimpleQueue[Job | None] = SimpleQueue()
+        self._jobs: SimpleQueue[Job] = SimpleQueue()
         self._newest: dict[str, Job] = {}
         self._now: Job | None = None
         self._open = True
@@ -74,14 +74,19 @@ class Worker(QObject):
         return job
 
     def close(self, seconds: float = 3.0) -> None:
-        """Stop at the next step; nothing more is told. Waits no longer than some seconds."""
+        """Stop at the next step; nothing more is told. Waits no longer than some seconds.
+
+        The thread itself stays, asleep: where a thread ends, QGIS drops what PROJ worked out on
+        it, and a CRS that was first met there is then invalid for all (seen in QGIS 3.22).
+        """
         self._open = False
+        _CLOSED.append(self)
         if self._now is not None:
             self._now.cancel()
-        self._jobs.put(None)
-        self._thread.join(seconds)
-        if self._thread.is_alive():
-            _LEFT.append(self)
+        until = time.monotonic() + seconds
+        while not self.is_idle and time.monotonic() < until:
+            time.sleep(0.01)
+        self._newest.clear()
 
     @property
     def is_idle(self) -> bool:
@@ -89,11 +94,10 @@ class Worker(QObject):
         return self._now is None and self._jobs.empty()
 
     def _work(self) -> None:
-        while (job := self._jobs.get()) is not None and self._open:
-            if not self._is_newest(job):
-                continue
-            self._now = job
-            self._do(job)
+        while True:
+            self._now = self._jobs.get()
+            if self._open and self._is_newest(self._now):
+                self._do(self._now)
             self._now = None
 
     def _do(self, job: Job) -> None:

@@ -141,6 +141,7 @@ def plugin(provider: Any, qgis_iface: Any, qgis_new_project: None) -> Iterator[A
     yield made
     made.provider = None
     made.unload()
+    qgis_iface.newProject()
     for _ in range(3):
         QCoreApplication.processEvents()
 
@@ -551,7 +552,7 @@ def test_unloading_leaves_nothing(begun: Table, qgis_iface: Any) -> None:
     for _ in range(5):
         QCoreApplication.processEvents()
     QCoreApplication.sendPostedEvents(None, 52)  # deferred deletes
-    assert not worker._thread.is_alive()
+    assert worker.is_idle
     assert begun.plugin.dock is None
     assert not [
         d for d in window.findChildren(QDockWidget) if d.objectName() == "UrbanProcessingSteering"

@@ -14,7 +14,7 @@ from shapely import affinity
 from urban_processing.errors import BoundaryError, EditError
 from urban_processing.hashing import child, splitmix64, unmixed
 from urban_processing.io.boundaries import read_boundary
-from urban_processing.layout import Layout, Stage, Steering
+from urban_processing.layout import EdgeKind, Layout, Stage, Steering
 from urban_processing.metrics import certificate
 from urban_processing.params import CogenerateParams
 from urban_processing.pipelines.cogenerate import cogenerate
@@ -289,16 +289,15 @@ def test_undoing_a_cut_gives_the_parcel_back(land: Site, session: Session) -> No
 
 def test_undoing_a_cut_takes_all_descendants(land: Site, session: Session) -> None:
     stepped(session, 1)
-    whole = session.parcels[0]
-    halves = session.choose(whole, 1).new
-    stepped(session, 3)
-    origin = np.asarray(session.layout.frame.origin)
-    change = session.undo_cut(halves[0]) if halves[0] in session.parcels else None
-    if change is None:
-        lineage = session.layout.face_lineage
-        assert len(descendants(lineage, int(lineage[0]), parents(lineage))) == 1
+    first, second = session.parcels
+    session.choose(first, 1)
+    half, other = session.choose(second, 1).new
+    quarters = session.choose(half, 1).new
+    change = session.undo_cut(other)
+    assert change.new == (second,)
+    assert set(change.gone) == {other, *quarters}
+    assert area_of(session, second) == pytest.approx(400 * 240 / 2, rel=0.3)
     assert_sound(session.layout, land)
-    assert origin.shape == (2,)
 
 
 def test_the_land_was_not_cut_from_anything(session: Session) -> None:
@@ -378,6 +377,54 @@ def test_parcels_that_cannot_be_merged(session: Session) -> None:
         session.merge([a, b])
 
 
+def test_stages_and_quotas_come_back_with_an_undone_cut(land: Site) -> None:
+    session = Session.begin(land, CogenerateParams(parcels=40))
+    stepped(session, 2)
+    first = session.parcels[0]
+    halves = session.choose(first, 1).new
+    quarters = session.choose(halves[0], 1).new
+    assert session.undo_cut(quarters[0]).new == (halves[0],)
+    stage = dict(zip(session.parcels, session.layout.face_stage.tolist(), strict=True))
+    assert stage[halves[0]] == Stage.AHEAD
+    session.step()
+    assert set(halves) <= set(session.parcels)
+    while not session.finished:
+        session.step()
+    total = int(session.layout.face_quota.sum())
+    small = next(p for p in session.parcels if session.candidates(p) == () and area_of(session, p))
+    assert total == 40
+    session.undo_cut(small)
+    assert int(session.layout.face_quota.sum()) == total
+
+
+def test_a_layout_whose_cut_was_undone_after_the_end_is_finished_again(session: Session) -> None:
+    session.finish()
+    parcel = next(p for p in session.parcels if _can_be_undone(session, p))
+    session.undo_cut(parcel)
+    assert not session.is_complete
+    session.finish()
+    assert session.is_complete
+
+
+def _can_be_undone(session: Session, parcel: int) -> bool:
+    lineage = session.layout.face_lineage
+    return int(lineage[session.parcels.index(parcel)]) in parents(lineage)
+
+
+def test_merged_parcels_keep_the_use_that_they_have_in_common(session: Session) -> None:
+    stepped(session, 4)
+    a, b = neighbours_without_street(session)
+    session.lock(a, "school")
+    one = session.merge([a, b]).new[0]
+    layout = session.layout
+    assert layout.land_uses[layout.face_use[session.parcels.index(one)]] == "school"
+    session.undo()
+    session.lock(b, "park")
+    with pytest.raises(EditError, match=r"different uses \(park, school\): say which use"):
+        session.merge([a, b])
+    assert session.merge([a, b], "campus").sentence.endswith("are one now, kept as campus.")
+
+
 # numbers and places
 
 
@@ -435,11 +482,11 @@ def test_undo_and_redo_return_the_same_bytes(session: Session) -> None:
     while session.can_undo:
         session.undo()
     assert session.layout.digest == digests[0]
-    assert session.undo().gone == ()
+    assert session.undo().sentence == "Nothing was done that could be undone."
     while session.can_redo:
         session.redo()
     assert session.layout.digest == digests[2]
-    assert session.redo().gone == ()
+    assert session.redo().sentence == "Nothing was undone that could be done again."
 
 
 def test_what_was_undone_is_a_branch(session: Session) -> None:
@@ -546,12 +593,13 @@ def test_a_parcel_that_was_split_by_hand(land: Site, session: Session) -> None:
     assert layout.face_locked.sum() == 1
     assert len(set(layout.face_lineage.tolist())) == 9
     assert_sound(layout, land)
-    assert number in change.gone or number in session.parcels
+    # one half is still the same parcel, the other is new
+    assert (number in session.parcels) == (len(change.new) == 1)
+    areas = [area_of(session, piece) for piece in {number, *change.new} & set(session.parcels)]
+    assert sum(areas) == pytest.approx(polygons[0].area, rel=1e-6)
 
 
-def test_a_street_that_was_drawn_and_one_that_was_deleted_by_hand(
-    land: Site, session: Session
-) -> None:
+def test_a_street_that_was_drawn_by_hand(land: Site, session: Session) -> None:
     stepped(session, 4)
     polygons, lines = layers_of(session)
     a, b = neighbours_without_street(session)
@@ -562,8 +610,45 @@ def test_a_street_that_was_drawn_and_one_that_was_deleted_by_hand(
     drawn = layout.edge_fixed >= 0
     assert layout.mesh.edge_length[drawn].sum() == pytest.approx(between.length, rel=1e-6)
     session.step()
-    assert (session.layout.edge_fixed >= 0).any()
+    assert session.layout.edge_street[session.layout.edge_fixed >= 0].all()
     assert_sound(session.layout, land)
+
+
+def test_a_street_that_was_deleted_by_hand_is_not_laid_again(land: Site, session: Session) -> None:
+    stepped(session, 5)
+    before = session.layout
+    inner = before.edge_street & (before.edge_kind == EdgeKind.INTERIOR)
+    polygons, _ = layers_of(session)
+    origin = np.asarray(before.frame.origin)
+    mesh = before.mesh
+    # of every inner street it is tried whether the layout can do without it
+    for edge in np.flatnonzero(inner).tolist():
+        kept = before.edge_street.copy()
+        kept[edge] = False
+        ends = mesh.xy[mesh.origin.reshape(-1, 2)[kept]] + origin
+        try:
+            session.adopt(polygons, shapely.linestrings(ends))
+        except EditError:
+            assert session.layout is before
+            continue
+        barred = session.layout.steered(Steering.NO_STREET)
+        length = mesh.edge_length[edge]
+        assert session.layout.mesh.edge_length[barred].sum() == pytest.approx(length)
+        assert not session.layout.edge_street[barred].any()
+        assert_sound(session.layout, land)
+        return
+    pytest.fail("no street can be done without")
+
+
+def test_layers_that_do_not_cover_the_land_are_refused(session: Session) -> None:
+    stepped(session, 3)
+    polygons, lines = layers_of(session)
+    fewer = [line for line in lines if shapely.distance(line, polygons[0]) > 0]
+    with pytest.raises(EditError, match="m² of the land belong to no parcel"):
+        session.adopt(polygons[1:], fewer)
+    more = [*polygons, shapely.box(1400, 2000, 1500, 2240)]
+    with pytest.raises(EditError, match="beyond the land: cut them at its rim"):
+        session.adopt(more, lines)
 
 
 @pytest.mark.parametrize("what", ["overlap", "gap", "off", "none"])

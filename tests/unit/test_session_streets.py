@@ -162,7 +162,7 @@ def test_way_avoids_lakes_and_bare_rims() -> None:
 
 def test_what_is_street_stays_and_remembers() -> None:
     moment = drawn(moment_of(SQUARE), [(0, 200), (400, 200)])
-    later = Moment(dataclasses.replace(moment.state, level=3), moment.known)
+    later = dataclasses.replace(moment, state=dataclasses.replace(moment.state, level=3))
     state, said = add_street(
         later, np.array([(0.0, 200.0), (200.0, 200.0), (200.0, 0.0)]), snap=5.0, follow=False,
         given=ANY,
@@ -297,7 +297,7 @@ def test_check_names_what_breaks() -> None:
     with pytest.raises(EditError, match="in 2 pieces that no street joins"):
         check(moment, next_moment(moment, loose))
     strict = dataclasses.replace(moment.state, min_area=90_000.0)
-    small = Moment(strict, moment.known)
+    small = dataclasses.replace(moment, state=strict)
     check(small, small)
     other = moment_of(SQUARE, rim=False)
     with pytest.raises(EditError, match="smallest parcel allowed is 90,000 m²"):

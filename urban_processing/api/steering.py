@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from urban_processing.api.land import land_and_params
 from urban_processing.errors import BoundaryError
+from urban_processing.io.edits import as_layout
 from urban_processing.io.features import Source
-from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayout
 from urban_processing.io.sessions import GeoSession
 from urban_processing.layout import Layout
@@ -87,7 +87,7 @@ def steer(
         options = (crs, layer, where, corners, streets, obstacles, locked, rim_lines, entries)
         if parameters or any(option is not None for option in options):
             raise BoundaryError("A layout brings its parameters along: leave out all others.")
-        session = GeoSession.of_layout(_layout(layout))
+        session = GeoSession.of_layout(as_layout(layout, snap=OptimizeParams.snap))
     else:
         if saved is not None and not parameters:
             parameters = saved.params().as_dict()
@@ -108,11 +108,3 @@ def steer(
     if saved is not None:
         session.replay(saved, progress)
     return session
-
-
-def _layout(layout: GeoLayout | Layout | str | PathLike[str]) -> Layout:
-    if isinstance(layout, GeoLayout):
-        return layout.layout
-    if isinstance(layout, Layout):
-        return layout
-    return read_layout(layout, snap=OptimizeParams().snap).layout

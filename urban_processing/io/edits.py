@@ -69,9 +69,9 @@ def read_edited(
     """
     if (after is None) == (parcels is None) or (parcels is None) != (streets is None):
         raise BoundaryError("Give the layout after the edit, or its parcels and streets.")
-    old = _layout(before, snap)
+    old = as_layout(before, snap=snap)
     if after is not None:
-        new = _layout(after, snap)
+        new = as_layout(after, snap=snap)
     else:
         new = read_layers(parcels, streets, snap=snap, before=old)
     layout, made = edits_listed(old, new, called=_name(before))
@@ -79,7 +79,16 @@ def read_edited(
     return GeoLayout(layout), table_frame(CHANGES, table, crs=layout.frame.crs)
 
 
-def _layout(given: Given, snap: float) -> Layout:
+def as_layout(given: Given, *, snap: float) -> Layout:
+    """Return a layout that may be given as its file, edited by hand or not.
+
+    Parameters
+    ----------
+    given
+        The layout, or its file.
+    snap
+        Metres within which parcels and streets of an edited file are fitted together.
+    """
     if isinstance(given, GeoLayout):
         return given.layout
     return given if isinstance(given, Layout) else read_layout(given, snap=snap).layout

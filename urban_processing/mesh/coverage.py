@@ -124,7 +124,8 @@ def _united(pieces: ObjectArray, owner: IntArray) -> tuple[ObjectArray, IntArray
     polygons: list[shapely.Polygon] = []
     source: list[int] = []
     order = np.argsort(owner, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
+    groups = np.split(order, np.flatnonzero(np.diff(owner[order])) + 1)
+    for own in groups if len(order) else []:
         several = len(own) > 1
         parts = shapely.get_parts(shapely.union_all(pieces[own])) if several else pieces[own]
         polygons += list(parts)

@@ -20,6 +20,9 @@ class Energy(enum.StrEnum):
     CLOSENESS = "closeness"
 
 
+LARGEST_SNAP = 10.0
+"""Largest tolerance in metres within which edited layers are fitted together."""
+
 _WEIGHTS, _EDITED = "Weights", "Edited layers"
 
 Snap = Annotated[
@@ -30,7 +33,7 @@ Snap = Annotated[
         "boundaries, are closed up to this width.",
         unit="m",
         above=0,
-        maximum=10,
+        maximum=LARGEST_SNAP,
         advanced=True,
         group=_EDITED,
     ),

@@ -105,7 +105,8 @@ def go_on(
 
 
 def _is_over(state: State, stop_at: int | None) -> bool:
-    return stop_at is not None and state.level >= stop_at
+    at_the_end = state.completed and state.finished
+    return stop_at is not None and state.level >= stop_at and not at_the_end
 
 
 def _message(state: State) -> str:

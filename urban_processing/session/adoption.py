@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 
 from urban_processing.assembly import assemble_layout, kept_of
 from urban_processing.errors import BoundaryError, EditError
@@ -23,6 +24,7 @@ from urban_processing.mesh.planar import IntArray
 from urban_processing.pipelines.hand_edits import ParcelMatch, match_parcels
 from urban_processing.pipelines.levels import State
 from urban_processing.session.moment import PARTS_OF_CUT, Moment
+from urban_processing.site import AREA_ROUNDING
 
 Geometries = npt.NDArray[np.object_]
 
@@ -74,8 +76,9 @@ def adopt(
     unfit = [issue.message for issue in drawn.issues if issue.code in UNFIT]
     if unfit:
         raise EditError(unfit)
+    _check_land(before, drawn, snap)
     match = match_parcels(before, drawn)
-    layout = _with_faces(_with_edges(before, drawn, snap), before, match)
+    layout = _with_faces(_with_edges(before, drawn, snap), moment, match)
     return dataclasses.replace(moment.state, layout=layout), (
         f"Layers were taken over; of the parcels {match.in_words}"
     )
@@ -106,13 +109,29 @@ def _with_edges(before: Layout, drawn: Layout, snap: float) -> Layout:
     )
 
 
-def _with_faces(layout: Layout, before: Layout, match: ParcelMatch) -> Layout:
+def _check_land(before: Layout, drawn: Layout, snap: float) -> None:
+    """Raise `EditError` unless the parcels cover the land that there was."""
+    old, new = (
+        shapely.coverage_union_all(layout.mesh.face_polygons()) for layout in (before, drawn)
+    )
+    slack = snap * old.length + AREA_ROUNDING * old.area
+    missing, more = shapely.difference(old, new).area, shapely.difference(new, old).area
+    if missing > slack:
+        raise EditError(
+            f"{missing:,.0f} m² of the land belong to no parcel: give the layer of all parcels."
+        )
+    if more > slack:
+        raise EditError(f"Parcels reach {more:,.0f} m² beyond the land: cut them at its rim.")
+
+
+def _with_faces(layout: Layout, moment: Moment, match: ParcelMatch) -> Layout:
     """The layout with what is known of its parcels."""
+    before = moment.state.layout
     own = match.source
     from_face = np.where(own >= 0, own, match.part_of)
     known = from_face >= 0
     lineage = np.where(own >= 0, before.face_lineage[own], 0).astype(np.uint64)
-    taken = set(before.face_lineage.tolist())
+    taken = set(moment.known)
     for face in np.flatnonzero(own < 0).tolist():
         parent = int(before.face_lineage[from_face[face]]) if known[face] else face
         lineage[face] = _free_child(parent, taken)

@@ -85,7 +85,7 @@ def cut_faces(moment: Moment, paths: Mapping[int, FloatArray]) -> State:
             paths.items(), vertices[0::2], vertices[1::2], strict=True
         )
     ]
-    after, _ = joined(moment, cut, joints)
+    after, _ = cut_between(moment, cut, joints)
     return after
 
 
@@ -194,7 +194,7 @@ def _shared_spot(layout: Layout, faces: Sequence[int], face: int, place: FloatAr
     return spot_on(layout, ring, place, reach=0.0, among=vertices)
 
 
-def joined(moment: Moment, layout: Layout, joints: Sequence[Joint]) -> tuple[State, IntArray]:
+def cut_between(moment: Moment, layout: Layout, joints: Sequence[Joint]) -> tuple[State, IntArray]:
     """Cut parcels between vertices of their boundaries, some of them perhaps several times.
 
     Parameters

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from urban_processing.pipelines import levels
 from urban_processing.pipelines.cogenerate import go_on
 from urban_processing.pipelines.levels import State
 from urban_processing.pipelines.stops import BLOCKS_DIVIDED, LEVEL
-from urban_processing.progress import Progress
+from urban_processing.progress import SILENT, Progress
 from urban_processing.session import adoption, parcel_edits, street_edits
 from urban_processing.session.moment import Moment
 from urban_processing.session.places import LEAST_SNAP, face_of, local, reach_of, snap_of
@@ -25,7 +26,6 @@ from urban_processing.session.reading import (
     Rings,
     flag,
     lines,
-    number,
     number_or_none,
     parcel,
     parcels,
@@ -34,6 +34,7 @@ from urban_processing.session.reading import (
     polygons,
     text,
     text_or_none,
+    tolerance,
     whole,
 )
 
@@ -42,7 +43,7 @@ PARK = "park"
 
 
 @dataclass(frozen=True)
-class Edit:
+class Edit(abc.ABC):
     """One thing that a planner does; coordinates are on the map."""
 
     name: ClassVar[str]
@@ -54,9 +55,9 @@ class Edit:
         del progress  # most edits take no time
         return self.done(moment)
 
+    @abc.abstractmethod
     def done(self, moment: Moment) -> tuple[State, str]:
         """Return the state after an edit that takes no time, and what was done."""
-        raise NotImplementedError
 
     def told(self) -> dict[str, Any]:
         """Return what provenance tells of the edit."""
@@ -82,6 +83,10 @@ class TakeStep(Edit):
 
     name: ClassVar[str] = "step"
     grows_streets: ClassVar[bool] = False
+
+    def done(self, moment: Moment) -> tuple[State, str]:
+        """Do it without telling how far it is."""
+        return self.apply(moment, SILENT)
 
     def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
         """Lay out the next level."""
@@ -218,7 +223,7 @@ class Adopt(Edit):
 
     parcels: tuple[Rings, ...] = field(metadata=_by(polygons))
     streets: tuple[tuple[Place, ...], ...] = field(metadata=_by(lines))
-    snap: float = field(default=LEAST_SNAP, metadata=_by(number))
+    snap: float = field(default=LEAST_SNAP, metadata=_by(tolerance))
     name: ClassVar[str] = "adopt"
 
     def told(self) -> dict[str, Any]:
@@ -248,9 +253,13 @@ class Finish(Edit):
     name: ClassVar[str] = "finish"
     grows_streets: ClassVar[bool] = False
 
+    def done(self, moment: Moment) -> tuple[State, str]:
+        """Do it without telling how far it is."""
+        return self.apply(moment, SILENT)
+
     def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
         """Finish the layout."""
-        if moment.state.completed:
+        if moment.state.completed and moment.state.finished:
             raise EditError("The layout is finished already.")
         layout, results = go_on(moment.state, stop_at=None, progress=progress)
         after = dataclasses.replace(

@@ -7,6 +7,7 @@ import numpy as np
 from urban_processing.access_rule import unreached_parcels_of
 from urban_processing.layout import EdgeKind
 from urban_processing.mesh.corners import polygon_irregularity, reported_corners
+from urban_processing.mesh.planar import IntArray
 from urban_processing.pipelines.levels import State
 
 
@@ -27,7 +28,7 @@ def figures(state: State) -> dict[str, float]:
     has_inner = inner_degree > 0
     return {
         "parcels": float(mesh.n_faces),
-        "to_cut": float(len(state.to_cut())),
+        "to_cut": float(len(next_to_cut(state))),
         "unreached": float(len(unreached_parcels_of(layout))),
         "mean_area_m2": float(mesh.face_area.mean()),
         "least_area_m2": float(mesh.face_area.min()),
@@ -37,6 +38,11 @@ def figures(state: State) -> dict[str, float]:
         "junctions": float((has_inner & (degree > 2)).sum()),
         "street_ends": float((has_inner & (degree == 1)).sum()),
     }
+
+
+def next_to_cut(state: State) -> IntArray:
+    """Faces that the next level cuts, or divides together with the rest of their block."""
+    return np.flatnonzero(~state.layout.face_locked) if state.divides_blocks else state.to_cut()
 
 
 def _degree(edges: np.ndarray, origin: np.ndarray, n_vertices: int) -> np.ndarray:

@@ -91,7 +91,7 @@ class Saved:
     start
         What the session began with; None where the file does not say.
     result
-        Number of parcels, level and hash at the end; empty where the file does not say.
+        Number of parcels at the end; empty where the file does not say.
     software
         Version of the software that saved it.
     """
@@ -119,6 +119,7 @@ class Saved:
         if self.start is None:
             return
         if (self.start.sha256, self.start.crs) == (start.sha256, start.crs):
+            self._check_parameters(start)
             return
         what = "the land is" if self.start.kind == "land" else "the layout is"
         if self.start.kind != start.kind:
@@ -129,6 +130,13 @@ class Saved:
         else:
             why = f"{what} another one, or has changed since"
         raise EditError(f"The edits of {self.path} cannot be done here: {why}.")
+
+    def _check_parameters(self, start: Start) -> None:
+        was, now = self.start.parameters if self.start else {}, start.parameters
+        other = [name for name in now if name in was and was[name] != now[name]]
+        if other:
+            values = ", ".join(f"{name} was {was[name]} and is {now[name]}" for name in other)
+            raise EditError(f"The edits of {self.path} were made with other parameters: {values}.")
 
     def check_result(self, layout: Layout) -> None:
         """Raise `EditError` if replaying made something else than what was saved."""
@@ -212,7 +220,7 @@ def as_json(
         "software": __version__,
         "start": start.as_dict(),
         "edits": rows,
-        "result": {"parcels": layout.mesh.n_faces, "sha256": layout.digest},
+        "result": {"parcels": layout.mesh.n_faces},
     }
     if current != len(rows):
         saved["current"] = current
@@ -234,7 +242,7 @@ def read(path: str | PathLike[str]) -> Saved:
         content = json.loads(source.read_text("utf-8-sig"))  # some editors write a mark first
     except FileNotFoundError:
         raise EditError(f"The file {source} does not exist.") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, RecursionError) as error:
         raise EditError(f"{source} cannot be read: {error}") from error
     except json.JSONDecodeError as error:
         raise EditError(

@@ -6,17 +6,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
 import shapely
 
 from urban_processing.errors import EditError
 from urban_processing.hashing import child
+from urban_processing.layout import Stage
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.pipelines.levels import State
 from urban_processing.session.model import Candidate
 
 PARTS_OF_CUT = (0, 1)
 """Ranks of the halves of a cut parcel among its parts, as `hashing.child` counts them."""
+
+
+@dataclass(frozen=True)
+class Uncut:
+    """What there was to know of a parcel before it was cut or merged.
+
+    Parameters
+    ----------
+    stage, quota
+        As in `Layout`.
+    level
+        Number of levels that there were.
+    """
+
+    stage: Stage
+    quota: int
+    level: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +49,13 @@ class Moment:
         Layout and level.
     known
         Number, counted from 1, of each lineage (see `Layout.face_lineage`).
+    uncut
+        What was known of lineages that are no more.
     """
 
     state: State
     known: Mapping[int, int]
+    uncut: Mapping[int, Uncut]
 
     @cached_property
     def parcels(self) -> tuple[int, ...]:
@@ -84,26 +104,31 @@ class Moment:
 
 def first_moment(state: State) -> Moment:
     """The moment that a session begins with."""
-    return next_moment(Moment(state, {}), state)
+    return _numbered(state, {}, {})
 
 
 def next_moment(before: Moment, state: State) -> Moment:
     """The moment after an edit: new parcels get the next numbers, in the order of their faces."""
-    known = dict(before.known)
+    layout = before.state.layout
+    there = set(state.layout.face_lineage.tolist())
+    gone = {
+        lineage: Uncut(Stage(stage), quota, before.state.level)
+        for lineage, stage, quota in zip(
+            layout.face_lineage.tolist(),
+            layout.face_stage.tolist(),
+            layout.face_quota.tolist(),
+            strict=True,
+        )
+        if lineage not in there
+    }
+    return _numbered(state, before.known, {**before.uncut, **gone})
+
+
+def _numbered(state: State, numbers: Mapping[int, int], uncut: Mapping[int, Uncut]) -> Moment:
+    known = dict(numbers)
     following = max(known.values(), default=0) + 1
     for lineage in state.layout.face_lineage.tolist():
         if lineage not in known:
             known[lineage] = following
             following += 1
-    return Moment(state, known)
-
-
-def as_place(xy: object) -> FloatArray:
-    """(2,) coordinates of a place; `EditError` where they are none."""
-    try:
-        place = np.asarray(xy, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError):
-        place = np.empty(0)
-    if len(place) != 2 or not np.isfinite(place).all():
-        raise EditError(f"A place must be two coordinates, x and y; {xy!r} is none.")
-    return place
+    return Moment(state, known, uncut)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from urban_processing.errors import EditError
-from urban_processing.layout import NOT_FIXED, Layout, Stage
+from urban_processing.layout import NOT_FIXED, PARCEL_USE, Layout, Stage
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.pipelines.levels import State
 from urban_processing.quotas import divided
@@ -23,6 +23,7 @@ from urban_processing.session.joining import joined, streets_between
 from urban_processing.session.lineage import descendants, merged, parents
 from urban_processing.session.model import Candidate
 from urban_processing.session.moment import Moment
+from urban_processing.session.wording import parcels_named
 from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.short_edges import remove_short_edges
@@ -92,18 +93,34 @@ def undo_cut(moment: Moment, face: int) -> Edited:
         raise EditError(f"Parcel {named} came of the same cut and is locked: unlock it first.")
     _check_no_given_street(moment, faces)
     one, kept = joined(moment, faces)
-    quota = int(layout.face_quota[faces].sum())
+    stage, quota = _as_before(moment, parent[lineage], faces)
     after = _with_face(
         one,
         kept,
         face_lineage=parent[lineage],
         face_level=int(layout.face_level[face]) - 1,
-        face_stage=Stage.OPEN if layout.face_stage[face] == Stage.AHEAD else Stage.BEHIND,
+        face_stage=stage,
         face_quota=quota,
     )
     halves = f"{len(faces)} parcels are" if len(faces) > 2 else "its halves are"
     sentence = f"The cut that parcel {number} came of was undone: {halves} one again"
     return dataclasses.replace(state, layout=after), sentence
+
+
+def _as_before(moment: Moment, lineage: int, faces: Sequence[int]) -> tuple[Stage, int]:
+    """Stage and quota of a parcel whose cut is undone, as they would be had it not been cut."""
+    state, layout = moment.state, moment.state.layout
+    was = moment.uncut.get(lineage)
+    # what is too small for a parcel, and was finished, is one all the same
+    quota = max(int(layout.face_quota[faces].sum()), len(faces)) if state.has_quota else 0
+    if was is None:  # cut before the session began
+        ahead = (layout.face_stage[faces] == Stage.AHEAD).all()
+        return (Stage.OPEN if ahead else Stage.BEHIND), quota
+    quota = was.quota if was.quota > 0 else quota
+    if was.level == state.level or was.stage == Stage.DONE:
+        return was.stage, quota
+    is_due = was.stage == Stage.AHEAD and was.level + 1 == state.level
+    return (Stage.OPEN if is_due else Stage.BEHIND), quota
 
 
 def lock(moment: Moment, face: int, land_use: str) -> Edited:
@@ -142,25 +159,35 @@ def merge(moment: Moment, faces: Sequence[int], land_use: str | None) -> Edited:
     if len(streets):
         a, b = (moment.number(int(f)) for f in layout.mesh.face.reshape(-1, 2)[streets[0]])
         raise EditError(f"A street runs between parcels {a} and {b}: remove it first.")
+    use = _common_use(moment, faces) if land_use is None else land_use
     one, kept = joined(moment, faces)
+    uses = one.land_uses if use in one.land_uses else (*one.land_uses, use)
     after = _with_face(
-        one,
+        one.replace(land_uses=uses),
         kept,
         face_lineage=merged(layout.face_lineage[faces]),
         face_level=int(layout.face_level[faces].min()),
         face_quota=int(layout.face_quota[faces].sum()),
         face_stage=int(layout.face_stage[faces].max()),
         face_locked=True,
-        face_use=0,
+        face_use=uses.index(use),
     )
-    numbers = " and ".join(str(moment.number(f)) for f in faces)
-    sentence = f"Parcels {numbers} are one now, and are not cut unless they are unlocked"
-    if land_use is not None:
-        uses = after.land_uses
-        uses = uses if land_use in uses else (*uses, land_use)
-        after = _with_face(after.replace(land_uses=uses), kept, face_use=uses.index(land_use))
-        sentence = f"Parcels {numbers} are one now, kept as {land_use}"
+    named = parcels_named(moment.number(f) for f in faces)
+    what = "not cut unless it is unlocked" if use == PARCEL_USE else f"kept as {use}"
+    sentence = f"{named[0].upper()}{named[1:]} are one now, {what}"
     return dataclasses.replace(state, layout=after), sentence
+
+
+def _common_use(moment: Moment, faces: Sequence[int]) -> str:
+    """The land use that several parcels have between them."""
+    layout = moment.state.layout
+    uses = {layout.land_uses[layout.face_use[face]] for face in faces} - {PARCEL_USE}
+    if len(uses) > 1:
+        raise EditError(
+            f"These parcels are kept for different uses ({', '.join(sorted(uses))}): say which use "
+            "they have together."
+        )
+    return uses.pop() if uses else PARCEL_USE
 
 
 def _with_face(layout: Layout, face: int, **values: int | bool) -> Layout:

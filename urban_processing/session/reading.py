@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from urban_processing.errors import EditError
+from urban_processing.params.optimize import LARGEST_SNAP
 
 LARGEST = 1e9
 """No distance on the map is as large, in metres."""
@@ -40,6 +41,14 @@ def number(value: Any) -> float:
     if not known or not 0 <= value <= LARGEST:
         raise EditError(f"must be a number of metres, 0 or more; it is {value!r}.")
     return float(value)
+
+
+def tolerance(value: Any) -> float:
+    """A number of metres within which edited layers are fitted together."""
+    metres = number(value)
+    if metres > LARGEST_SNAP:
+        raise EditError(f"must be at most {LARGEST_SNAP:g} m; it is {metres:g}.")
+    return metres
 
 
 def text(value: Any) -> str:
@@ -127,13 +136,16 @@ def parcels(value: Any) -> tuple[int | Place, ...]:
 
 
 def _coordinates(value: Any) -> np.ndarray:
-    coords = getattr(value, "coords", value)
+    """(2,) coordinates of a place, or (n, 2) of a line; heights of geometries are left out."""
+    if isinstance(value, shapely.Geometry):
+        if value.geom_type not in ("Point", "LineString", "LinearRing"):
+            raise EditError(f"must be a place or a line; it is a {value.geom_type}.")
+        xy = shapely.get_coordinates(value)
+        return np.asarray(xy[0] if value.geom_type == "Point" and len(xy) else xy)
     try:
-        xy = np.asarray(list(coords), dtype=np.float64)
+        xy = np.asarray(list(value), dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         xy = np.full(1, math.nan)
     if not np.isfinite(xy).all():
         raise EditError("must be finite coordinates.")
-    # a point is one pair, also as a geometry; heights are left out
-    xy = xy[0] if hasattr(value, "coords") and len(xy) == 1 else xy
-    return xy[..., :2] if xy.ndim and xy.shape[-1] == 3 and hasattr(value, "coords") else xy
+    return np.asarray(xy)

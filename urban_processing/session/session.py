@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Iterable, Sequence
 from os import PathLike
@@ -11,26 +12,24 @@ from typing import Any, Self
 import numpy.typing as npt
 import shapely
 
-from urban_processing.errors import EditError, UrbanError
+from urban_processing.errors import EditError
 from urban_processing.layout import Layout
 from urban_processing.params.cogenerate import CogenerateParams
-from urban_processing.pipelines.levels import State, begin, with_streets
+from urban_processing.pipelines.levels import State, begin
 from urban_processing.pipelines.stops import ALGORITHM, progress_of, state_of
 from urban_processing.progress import SILENT, Progress
 from urban_processing.provenance import Step
 from urban_processing.rebuild import canonical
 from urban_processing.session import files
-from urban_processing.session.edits import Edit, make_edit
-from urban_processing.session.figures import figures
-from urban_processing.session.model import Branch, Candidate, Change
-from urban_processing.session.moment import Moment, first_moment, next_moment
+from urban_processing.session.edits import make_edit
+from urban_processing.session.figures import figures, next_to_cut
+from urban_processing.session.history import History
+from urban_processing.session.model import Candidate, Change
+from urban_processing.session.moment import Moment, first_moment
 from urban_processing.session.parcel_edits import cuts_of
 from urban_processing.session.places import face_of, local
 from urban_processing.session.reading import parcel as read_parcel
 from urban_processing.session.reading import place as read_place
-from urban_processing.session.requirements import check
-from urban_processing.session.streets_laid import streets_laid
-from urban_processing.session.timeline import Timeline
 from urban_processing.site import Site
 from urban_processing.version import __version__
 
@@ -40,7 +39,7 @@ STEER = "steer"
 Place = tuple[float, float]
 
 
-class Session:
+class Session(History):
     """A layout in the making: look at each level, change what is not liked, let it go on.
 
     Parcels have numbers that they keep until they are cut or merged; wherever a parcel is asked
@@ -58,8 +57,8 @@ class Session:
     """
 
     def __init__(self, state: State, start: files.Start) -> None:
+        super().__init__(first_moment(state), start.sentence)
         self._start = start
-        self._timeline = Timeline.beginning(first_moment(state), start.sentence)
         self._shown: tuple[Moment, int, Layout] | None = None
 
     @classmethod
@@ -100,10 +99,6 @@ class Session:
         return cls(state, files.start_with_layout(state.layout, state.params))
 
     # what there is now
-
-    @property
-    def _moment(self) -> Moment:
-        return self._timeline.moment(self._timeline.now, self._after)
 
     @property
     def layout(self) -> Layout:
@@ -149,20 +144,15 @@ class Session:
         return self._moment.state.completed and self.finished
 
     @property
+    def to_cut(self) -> tuple[int, ...]:
+        """Numbers of the parcels that the next level cuts, or divides with their blocks."""
+        moment = self._moment
+        return tuple(moment.number(face) for face in next_to_cut(moment.state).tolist())
+
+    @property
     def parcels(self) -> tuple[int, ...]:
         """Number of each parcel, in the order of the layout's faces."""
         return self._moment.parcels
-
-    @property
-    def edits(self) -> tuple[Edit, ...]:
-        """What was done, from the beginning to now."""
-        entries = (self._timeline.entries[number].edit for number in self._timeline.path())
-        return tuple(edit for edit in entries if edit is not None)
-
-    @property
-    def sentence(self) -> str:
-        """What was done last."""
-        return self._timeline.entries[self._timeline.now].sentence
 
     def figures(self) -> dict[str, float]:
         """Figures of the layout as it is now, by name: see `urban_processing.session.figures`."""
@@ -293,66 +283,6 @@ class Session:
         given = {key: value for key, value in values.items() if value is not None}
         return self._do(make_edit(name, given), progress)
 
-    def _do(self, edit: Edit, progress: Progress = SILENT) -> Change:
-        before = self._moment
-        after, sentence = _applied(before, edit, progress)
-        self._timeline.add(edit, after, sentence)
-        before.cuts.clear()  # they take memory, and are found again if somebody comes back
-        return _change(before, after, sentence)
-
-    @staticmethod
-    def _after(moment: Moment, edit: Edit) -> Moment:
-        return _applied(moment, edit, SILENT)[0]
-
-    # back and forth
-
-    @property
-    def can_undo(self) -> bool:
-        """Whether something was done."""
-        return self._timeline.now > 0
-
-    @property
-    def can_redo(self) -> bool:
-        """Whether something was undone here."""
-        return self._timeline.now in self._timeline.ahead
-
-    def undo(self) -> Change:
-        """Go back to before the last edit; where there is none, nothing happens."""
-        entry = self._timeline.entries[self._timeline.now]
-        return self._go_to(max(entry.before, 0), f"Undone: {_in_clause(entry.sentence)}")
-
-    def redo(self) -> Change:
-        """Do again what was undone last; where that is nothing, nothing happens."""
-        number = self._timeline.ahead.get(self._timeline.now, self._timeline.now)
-        return self._go_to(number, self._timeline.entries[number].sentence)
-
-    def branches(self) -> tuple[Branch, ...]:
-        """The ends of all that was done, also of what was undone and gone on from otherwise."""
-        timeline = self._timeline
-        last = timeline.last()
-        return tuple(
-            Branch(
-                number=tip,
-                sentence=timeline.entries[tip].sentence,
-                edits=len(timeline.path(tip)) - 1,
-                current=tip == last,
-            )
-            for tip in timeline.tips()
-        )
-
-    def go_to(self, branch: int) -> Change:
-        """Go to the end of a branch, by its number."""
-        numbers = [each.number for each in self.branches()]
-        if branch not in numbers:
-            listed = ", ".join(map(str, numbers))
-            raise EditError(f"There is no branch {branch}; there are {listed}.")
-        return self._go_to(branch, self._timeline.entries[branch].sentence)
-
-    def _go_to(self, number: int, sentence: str) -> Change:
-        before = self._moment
-        self._timeline.go_to(number)
-        return _change(before, self._moment, sentence)
-
     # files
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> Path:
@@ -395,7 +325,6 @@ class Session:
             session = cls.begin(start, saved.params())
         else:
             session = cls.of_layout(start)
-        saved.check_start(session._start)
         session.replay(saved, progress)
         return session
 
@@ -405,16 +334,15 @@ class Session:
         Raises
         ------
         EditError
-            Where one cannot be done; nothing has changed then.
+            If they were made on something else, or where one cannot be done; nothing has changed
+            then.
         """
-        untouched = self._timeline
-        self._timeline = untouched.copy()
-        try:
-            self._replay(saved, progress)
-            saved.check_result(self.layout)
-        except UrbanError:
-            self._timeline = untouched
-            raise
+        saved.check_start(self._start)
+        other = copy.copy(self)
+        other._timeline = self._timeline.copy()
+        other._replay(saved, progress)
+        saved.check_result(other.layout)
+        self._timeline = other._timeline
 
     def _replay(self, saved: files.Saved, progress: Progress) -> None:
         count = len(saved.edits)
@@ -429,23 +357,3 @@ class Session:
             numbers.append(self._timeline.now)
         self._timeline.go_to(numbers[saved.redo])
         self._timeline.go_to(numbers[saved.current])
-
-
-def _applied(before: Moment, edit: Edit, progress: Progress) -> tuple[Moment, str]:
-    """The moment after an edit with the streets it needs, and what was done."""
-    state, sentence = edit.apply(before, progress)
-    if not edit.grows_streets:
-        return next_moment(before, state), f"{sentence}."
-    grown = with_streets(state)
-    after = next_moment(before, grown)
-    check(before, after)
-    return after, f"{sentence}{streets_laid(state.layout, grown.layout)}."
-
-
-def _change(before: Moment, after: Moment, sentence: str) -> Change:
-    old, new = set(before.parcels), set(after.parcels)
-    return Change(sentence, gone=tuple(sorted(old - new)), new=tuple(sorted(new - old)))
-
-
-def _in_clause(sentence: str) -> str:
-    return sentence[:1].lower() + sentence[1:]

@@ -15,7 +15,7 @@ from urban_processing.pipelines.levels import State
 from urban_processing.session.cutting import (
     Joint,
     check_large_enough,
-    joined,
+    cut_between,
     thinned,
 )
 from urban_processing.session.drawn_line import SAME_PLACE, DrawnLine, as_line, as_points
@@ -40,7 +40,7 @@ SHRINKING = (1.0, 0.3, 0.1)
 THINNED = 0.1
 """A drawn line is thinned by this share of the snap distance."""
 
-LEAST_SNAP = 0.01
+CLOSEST_SNAP = 0.01
 """Smallest snap distance in metres."""
 
 BESIDE = 2.0
@@ -82,7 +82,7 @@ def add_street(
     EditError
         If the line is none, or no street can run along it.
     """
-    snap = max(snap, LEAST_SNAP)
+    snap = max(snap, CLOSEST_SNAP)
     state = moment.state
     if follow:
         cut: list[int] = []
@@ -225,7 +225,7 @@ def _laid(
     moment: Moment, line: DrawnLine, street: _Street, snap: float
 ) -> tuple[State, IntArray, list[int]]:
     """Cut the parcels, and find the ways along boundaries between the cuts."""
-    state, new = joined(moment, street.layout, street.joints)
+    state, new = cut_between(moment, street.layout, street.joints)
     edges = [new, *(_walk(state.layout, line, walk, snap) for walk in street.walks)]
     return state, np.unique(np.concatenate(edges)), [joint.face for joint in street.joints]
 

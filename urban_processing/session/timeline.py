@@ -11,7 +11,8 @@ from urban_processing.session.edits import Edit, Finish, TakeStep
 from urban_processing.session.moment import Moment
 
 KEPT = 64
-"""Number of latest moments that are kept; others are made again when they are asked for."""
+"""So many moments are kept that were asked for last, besides the beginning and the ends of levels;
+others are made again when they are asked for."""
 
 
 @dataclass
@@ -43,6 +44,8 @@ class Timeline:
     entries: list[Entry]
     now: int = 0
     ahead: dict[int, int] = field(default_factory=dict)
+    used: dict[int, None] = field(default_factory=dict)
+    """Entries whose moments may be dropped, those used last at the end."""
 
     @classmethod
     def beginning(cls, moment: Moment, sentence: str) -> Timeline:
@@ -51,14 +54,15 @@ class Timeline:
 
     def copy(self) -> Timeline:
         """Return a timeline with the same entries that goes on by itself."""
-        return Timeline(list(map(copy.copy, self.entries)), self.now, dict(self.ahead))
+        entries = list(map(copy.copy, self.entries))
+        return Timeline(entries, self.now, dict(self.ahead), dict(self.used))
 
     def add(self, edit: Edit, moment: Moment, sentence: str) -> None:
         """Go on from now with an edit."""
         self.entries.append(Entry(edit, self.now, sentence, moment))
         self.ahead[self.now] = len(self.entries) - 1
         self.now = len(self.entries) - 1
-        self._forget()
+        self._use(self.now)
 
     def path(self, number: int | None = None) -> list[int]:
         """Numbers of the entries from the beginning to one of them, by default to now."""
@@ -98,10 +102,18 @@ class Timeline:
             edit = self.entries[later].edit
             if edit is not None:
                 moment = self.entries[later].moment = apply(moment, edit)
+                self._use(later)
+        self._use(number)
         return moment
 
-    def _forget(self) -> None:
-        """Drop moments of long ago, but for the beginning and the ends of levels."""
-        old = len(self.entries) - 1 - KEPT
-        if old > 0 and not isinstance(self.entries[old].edit, TakeStep | Finish):
-            self.entries[old].moment = None
+    def _use(self, number: int) -> None:
+        """Note that a moment was used, and drop the one that was not used for the longest time."""
+        edit = self.entries[number].edit
+        if edit is None or isinstance(edit, TakeStep | Finish):
+            return
+        self.used.pop(number, None)
+        self.used[number] = None
+        if len(self.used) > KEPT:
+            oldest = next(iter(self.used))
+            del self.used[oldest]
+            self.entries[oldest].moment = None
