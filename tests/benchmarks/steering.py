@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from tests.benchmarks.run import ONE_CORE, ROOT, say, say_row
 
@@ -88,8 +89,23 @@ def timed(session: Any, each: int) -> Iterator[list[str]]:
     for name, spent in taken.items():
         yield row(name, spent, refused[name])
     yield row("undo", undone)
+    layers = (
+        list(session.layout.mesh.face_polygons(session.layout.frame.origin)),
+        streets_of(session),
+    )
+    yield row("adopt", [clock(lambda: session.adopt(*layers))])
+    session.undo()
     yield row("step", [clock(session.step)])
     session.undo()
+    yield row("finish", [clock(session.finish)])
+    session.undo()
+
+
+def streets_of(session: Any) -> list[shapely.LineString]:
+    """Streets on the map."""
+    mesh = session.layout.mesh
+    ends = mesh.xy[mesh.origin.reshape(-1, 2)[session.layout.edge_street]]
+    return list(shapely.linestrings(ends + np.asarray(session.layout.frame.origin)))
 
 
 def row(name: str, spent: list[float | None], refused: int = 0) -> list[str]:
