@@ -128,7 +128,7 @@ def _turned(moment: Moment, degrees: float) -> Moment:
     layout = moment.state.layout
     mesh = dataclasses.replace(layout.mesh, xy=snap_to_grid(_rotate(layout.mesh.xy, degrees)))
     state = dataclasses.replace(moment.state, layout=layout.replace(mesh=mesh))
-    return Moment(state, moment.known)
+    return dataclasses.replace(moment, state=state)
 
 
 @FEW

@@ -221,7 +221,10 @@ def test_locked_parcels_are_not_crossed() -> None:
     moment = locked(moment_of(SQUARE, levels=2), 1, "park")
     place = shapely.point_on_surface(moment.state.layout.mesh.face_polygons()[moment.face(1)])
     said = refusal(moment, [(0, place.y), (400, place.y)])
-    assert said == "Parcel 1 is locked as park: no cut and no street may cross it."
+    assert (
+        said
+        == "Parcel 1 is locked as park: no cut and no street may cross it until it is unlocked."
+    )
     park = LockedLand(shapely.box(100, 100, 180, 180), "park")
     given = moment_of(dataclasses.replace(site_of(SQUARE), locked=(park,)))
     assert "locked as park" in refusal(given, [(0, 140), (400, 140)])

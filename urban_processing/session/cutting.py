@@ -155,8 +155,8 @@ def check_can_be_cut(moment: Moment, faces: Sequence[int]) -> None:
     """Raise `EditError` with a sentence for each face that is locked, or has a hole."""
     layout = moment.state.layout
     problems = [
-        f"Parcel {moment.number(face)} is locked as {layout.land_uses[layout.face_use[face]]}: "
-        "no cut and no street may cross it."
+        f"Parcel {moment.number(face)} is {locked_as(layout.land_uses[layout.face_use[face]])}: no "
+        "cut and no street may cross it until it is unlocked."
         for face in faces
         if layout.face_locked[face]
     ]

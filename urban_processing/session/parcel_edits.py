@@ -17,13 +17,13 @@ from urban_processing.mesh.planar import FloatArray
 from urban_processing.pipelines.levels import State
 from urban_processing.quotas import divided
 from urban_processing.session.candidates import candidates
-from urban_processing.session.cutting import cut_faces, path_across
+from urban_processing.session.cutting import check_can_be_cut, cut_faces, path_across
 from urban_processing.session.halves import ahead, with_kept_cuts
 from urban_processing.session.joining import joined, streets_between
 from urban_processing.session.lineage import descendants, merged, parents
 from urban_processing.session.model import Candidate
 from urban_processing.session.moment import Moment
-from urban_processing.session.wording import parcels_named
+from urban_processing.session.wording import locked_as, parcels_named
 from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.short_edges import remove_short_edges
@@ -48,7 +48,7 @@ def _cuts(moment: Moment, face: int) -> tuple[Candidate, ...]:
 def choose(moment: Moment, face: int, rank: int) -> Edited:
     """Cut a parcel by one of its candidates."""
     state, number = moment.state, moment.number(face)
-    _check_cuttable(moment, face)
+    check_can_be_cut(moment, [face])
     found = cuts_of(moment, face)
     if not 1 <= rank <= len(found):
         raise EditError(_no_candidate(moment, face, rank, len(found)))
@@ -73,7 +73,6 @@ def choose(moment: Moment, face: int, rank: int) -> Edited:
 
 def draw_cut(moment: Moment, face: int, line: FloatArray, *, snap: float) -> Edited:
     """Cut a parcel along a line that somebody drew."""
-    _check_cuttable(moment, face)
     path = path_across(moment, face, line, snap=snap)
     after = ahead(moment.state, cut_faces(moment, {face: path}))
     return after, f"Parcel {moment.number(face)} was cut along a line"
@@ -131,7 +130,7 @@ def lock(moment: Moment, face: int, land_use: str) -> Edited:
     state, layout = moment.state, moment.state.layout
     uses = layout.land_uses if use in layout.land_uses else (*layout.land_uses, use)
     if layout.face_locked[face] and layout.face_use[face] == uses.index(use):
-        raise EditError(f"Parcel {moment.number(face)} is locked as {use} already.")
+        raise EditError(f"Parcel {moment.number(face)} is {locked_as(use)} already.")
     after = _with_face(
         layout.replace(land_uses=uses), face, face_locked=True, face_use=uses.index(use)
     )
@@ -198,15 +197,6 @@ def _with_face(layout: Layout, face: int, **values: int | bool) -> Layout:
         column[face] = value
         changed[name] = column
     return layout.replace(**changed)
-
-
-def _check_cuttable(moment: Moment, face: int) -> None:
-    layout, number = moment.state.layout, moment.number(face)
-    if layout.face_locked[face]:
-        use = layout.land_uses[layout.face_use[face]]
-        raise EditError(f"Parcel {number} is locked ({use}): unlock it first.")
-    if layout.mesh.face_n_loops[face] > 1:
-        raise EditError(f"Parcel {number} lies around a lake: it cannot be cut by hand.")
 
 
 def _no_candidate(moment: Moment, face: int, rank: int, count: int) -> str:

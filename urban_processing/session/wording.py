@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from urban_processing.layout import PARCEL_USE
+
 NAMED = 6
 """So many parcels are named at most; of more, so many and how many there are."""
 
@@ -16,6 +18,11 @@ def parcels_named(numbers: Iterable[int]) -> str:
     if len(names) <= NAMED:
         return f"parcels {_listed(names)}"
     return f"{len(names):,} parcels, such as {_listed(names[:NAMED])}"
+
+
+def locked_as(land_use: str) -> str:
+    """Return "locked as park", or "locked" where there is no such use."""
+    return "locked" if land_use == PARCEL_USE else f"locked as {land_use}"
 
 
 def areas_named(areas: Sequence[float]) -> str:
