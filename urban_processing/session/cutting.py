@@ -19,7 +19,7 @@ from urban_processing.quotas import divided
 from urban_processing.session.drawn_line import SAME_PLACE, as_line, as_points
 from urban_processing.session.moment import Moment
 from urban_processing.session.spots import Spot, spot_on, with_vertices
-from urban_processing.session.wording import areas_named, parcels_named
+from urban_processing.session.wording import areas_named, locked_as, parcels_named
 from urban_processing.site import AREA_ROUNDING, snap_to_grid
 from urban_processing.subdivision.insert import (
     LEAST_CLEARANCE,
