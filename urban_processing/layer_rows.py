@@ -6,6 +6,7 @@ nothing, is left to defaults.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -158,6 +159,14 @@ def parcel_rows(columns: Mapping[str, npt.NDArray[Any]], n: int) -> ParcelRows:
         said(QUOTA, _whole),
         tuple(issues),
     )
+
+
+def kept_for_uses(rows: ParcelRows) -> ParcelRows:
+    """The rows, those with a use of their own locked for it, as the parcels of layouts are."""
+    plain = (None, PARCEL_USE)
+    pairs = zip(rows.locked.values, rows.use.values, strict=True)
+    locked = Said(tuple(is_locked if use in plain else True for is_locked, use in pairs))
+    return dataclasses.replace(rows, locked=locked)
 
 
 def street_rows(columns: Mapping[str, npt.NDArray[Any]], n: int, *, n_given: int = 0) -> StreetRows:

@@ -111,7 +111,7 @@ def test_finish_goes_through_all_levels(land: Site, session: Session) -> None:
     assert change.sentence == f"Finished: {len(session.parcels)} parcels."
     with pytest.raises(EditError, match="finished already"):
         session.finish()
-    with pytest.raises(EditError, match="finish the layout"):
+    with pytest.raises(EditError, match="that the next level could cut"):
         session.step()
 
 
@@ -330,7 +330,7 @@ def test_a_park_stays_as_it_is(land: Site, session: Session) -> None:
         session.choose(session.parcels[face], 1)
     with pytest.raises(EditError, match="locked as park already"):
         session.lock(session.parcels[face], "park")
-    with pytest.raises(EditError, match="needs a land use"):
+    with pytest.raises(EditError, match="must name a use"):
         session.lock(session.parcels[face], "  ")
 
 
@@ -429,7 +429,7 @@ def test_merged_parcels_keep_the_use_that_they_have_in_common(session: Session) 
 
 
 def test_unknown_parcels_say_what_became_of_them(session: Session) -> None:
-    with pytest.raises(EditError, match=r"There is no parcel 99\."):
+    with pytest.raises(EditError, match=r"There is no parcel 99; now there is parcel 1\."):
         session.candidates(99)
     session.step()
     with pytest.raises(EditError, match="Parcel 1 is no more: it was cut into 2 and 3"):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import shapely
 
 import urban_processing as up
 from urban_processing.errors import BoundaryError, EditError, ParameterError
+from urban_processing.session.edits import make_edit
 
 LAND = shapely.box(0, 0, 300, 200)
 
@@ -95,3 +99,39 @@ def test_what_steer_does_not_take(saved: Path) -> None:
         up.steer(layout=layout, replay=saved)
     with pytest.raises(EditError, match="does not exist"):
         up.steer(LAND, crs="EPSG:32630", replay=saved.with_name("other.json"))
+
+
+def test_the_example_of_the_documentation_runs(
+    sample: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    land = sample("irregular_64ha")
+    root = land.parents[1]
+    text = (root / "docs" / "steering.md").read_text("utf-8")
+    code = text.split("```python\n")[1].split("```")[0]
+    assert "sample_data/irregular_64ha.gpkg" in code
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(code.replace("sample_data/irregular_64ha.gpkg", str(land)), names)
+    session = names["session"]
+    assert session.is_complete
+    assert (session.view.parcels.land_use == "park").sum() == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"layout.gpkg", "session.json"}
+
+
+def test_the_edits_of_the_documentation_are_read(sample: Callable[[str], Path]) -> None:
+    text = (sample("rect").parents[1] / "docs" / "steering.md").read_text("utf-8")
+    for row in json.loads(text.split("```json\n")[1].split("```")[0]):
+        make_edit(row.pop("edit"), row)
+
+
+def test_frames_are_taken_over() -> None:
+    session = up.steer(LAND, crs="EPSG:32630", min_area=2000)
+    for _ in range(3):
+        session.step()
+    change = session.adopt(session.numbered_parcels, session.view.streets)
+    assert change.gone == change.new == ()
+
+
+def test_a_session_stops_after_every_level() -> None:
+    with pytest.raises(ParameterError, match="leave out stop_at_level"):
+        up.steer(LAND, crs="EPSG:32630", min_area=2000, stop_at_level=3)

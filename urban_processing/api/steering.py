@@ -8,7 +8,7 @@ from typing import Any
 import numpy.typing as npt
 
 from urban_processing.api.land import land_and_params
-from urban_processing.errors import BoundaryError
+from urban_processing.errors import BoundaryError, ParameterError
 from urban_processing.io.edits import as_layout
 from urban_processing.io.features import Source
 from urban_processing.io.frames import GeoLayout
@@ -82,6 +82,8 @@ def steer(
     """
     if (boundary is None) == (layout is None):
         raise BoundaryError("Give the land that a session begins with, or a layout.")
+    if parameters.get("stop_at_level") is not None:
+        raise ParameterError("A session stops after every level: leave out stop_at_level.")
     saved = None if replay is None else read(replay)
     if layout is not None:
         options = (crs, layer, where, corners, streets, obstacles, locked, rim_lines, entries)

@@ -13,7 +13,7 @@ from urban_processing.io.boundaries import read_boundary
 from urban_processing.io.fabrics import is_layout_file
 from urban_processing.io.files import read_layout
 from urban_processing.io.frames import GeoLayout
-from urban_processing.layout import Layout
+from urban_processing.layout import Layout, Stage
 from urban_processing.session.session import Session
 from urban_processing.site import Site
 
@@ -69,9 +69,25 @@ class GeoSession(Session):
 
     @property
     def numbered_parcels(self) -> gpd.GeoDataFrame:
-        """Parcels as they are now, indexed by the numbers that edits take."""
-        frame = self.view.frame("parcels").drop(columns="parcel_id")
-        return frame.set_index(pd.Index(self.parcels, name="parcel"))
+        """Parcels as they are now, indexed by the numbers that edits take.
+
+        With level, area, frontage, land use and stage; `view` has all that is known of them.
+        """
+        layout = self.layout
+        columns = {
+            "level": layout.face_level,
+            "area_m2": layout.mesh.face_area,
+            "frontage_m": layout.frontage,
+            "land_use": [layout.land_uses[use] for use in layout.face_use.tolist()],
+            "locked": layout.face_locked,
+            "stage": [Stage(stage).name.lower() for stage in layout.face_stage.tolist()],
+        }
+        return gpd.GeoDataFrame(
+            columns,
+            geometry=layout.mesh.face_polygons(layout.frame.origin),
+            crs=layout.frame.crs or None,
+            index=pd.Index(self.parcels, name="parcel"),
+        )
 
     def candidate_lines(self, parcel: int | tuple[float, float]) -> gpd.GeoDataFrame:
         """Ways of cutting a parcel, indexed by rank, with their scores and what they are made of.

@@ -13,6 +13,7 @@ import numpy as np
 
 from urban_processing.errors import BoundaryError, UrbanError
 from urban_processing.layout import Layout
+from urban_processing.layout_file.by_hand import check_crs, street_places
 from urban_processing.layout_file.geopackage import (
     LAYERS_STATE,
     LAYOUT_STATE,
@@ -110,12 +111,13 @@ def read_layout(
     Raises
     ------
     BoundaryError
-        If there is no such file, or it is no layout file.
+        If there is no such file, it is no layout file, or parcels or streets are in another CRS.
     TopologyError
         If its parcels or streets were changed so that they no longer fit together.
     """
     source = Path(path)
     state = _read_state(source)
+    check_crs(source)
     x, y = state["origin"]
     file = LayoutFile(source, Frame(state["crs"], (float(x), float(y))), library)
     try:
@@ -150,6 +152,7 @@ def _state(layout: Layout) -> str:
             ],
             "land_uses": list(layout.land_uses),
             "steered_edges": _steered_edges(layout),
+            "street_places": street_places(layout),
         }
     )
 

@@ -21,16 +21,19 @@ from urban_processing.layer_rows import (
     STAGE,
     STREET_COLUMNS,
     ParcelRows,
+    kept_for_uses,
     parcel_rows,
     street_rows,
     values_of_faces,
 )
 from urban_processing.layout import GivenStreet, Layout, Stage
+from urban_processing.layout_file.by_hand import barred_where_deleted, land_note
 from urban_processing.layout_file.geopackage import LayerLibrary
 from urban_processing.mesh.places import line_segments
 from urban_processing.provenance import Step
 from urban_processing.rebuild import LayoutParts, rebuild_layout
 from urban_processing.schema import (
+    BOUNDARY,
     INPUT_BOUNDARY,
     ISSUES,
     OBSTACLES,
@@ -94,12 +97,13 @@ def read_exactly(file: LayoutFile, state: Mapping[str, Any]) -> Layout:
             raise TopologyError("Parcels overlap, or a corner of one lies on the side of another.")
         issues = (*([_NOTE_OF_EDIT] if split else []), *_read_issues(file))
         layout = rebuild_layout(parts, frame=file.frame, min_area=state["min_area"], issues=issues)
-        return layout.replace(
+        layout = layout.replace(
             street_rules=StreetRules.from_dict(state.get("street_rules", {})),
             corners_given=state["corners_given"],
             history=_read_history(file),
             input_parts=_read_polygons(file, INPUT_BOUNDARY.name),
         )
+        return barred_where_deleted(layout, state, 0.0)
     except TopologyError as error:
         raise TopologyError(
             [
@@ -143,7 +147,9 @@ def read_edited(file: LayoutFile, state: Mapping[str, Any], snap: float) -> Layo
             kept=kept,
             rows=(rows.taken(of_parcel), given.taken(of_street)),
         )
-        return layout.replace(issues=(_NOTE_OF_EDIT, *layout.issues))
+        note = land_note(layout, _read_polygons(file, BOUNDARY.name), snap)
+        layout = layout.replace(issues=(_NOTE_OF_EDIT, *note, *layout.issues))
+        return barred_where_deleted(layout, state, snap)
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise BoundaryError(f"{file.path} cannot be read: {error}") from error
 
@@ -177,7 +183,7 @@ def _parcel_rows(
     """What the rows of a file say of parcels; all are done where it knows no stages."""
     if state["format"] < STAGES_SINCE:
         parcel = {**parcel, STAGE: np.full(n, Stage.DONE.name, dtype=object)}
-    return parcel_rows(parcel, n)
+    return kept_for_uses(parcel_rows(parcel, n))
 
 
 def _steering(state: Mapping[str, Any]) -> tuple[FloatArray, npt.NDArray[np.uint8]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -24,17 +25,22 @@ from urban_processing.mesh.planar import IntArray
 from urban_processing.pipelines.hand_edits import ParcelMatch, match_parcels
 from urban_processing.pipelines.levels import State
 from urban_processing.session.moment import PARTS_OF_CUT, Moment
-from urban_processing.site import AREA_ROUNDING
+from urban_processing.site import AREA_ROUNDING, Issue
 
 Geometries = npt.NDArray[np.object_]
 
-UNFIT = frozenset(
-    {
-        *("parcels_overlap", "hole_between_parcels", "parcel_lost", "street_off_boundaries"),
-        "parcel_in_pieces",
-    }
-)
-"""Issues of putting layers together that stand against taking them over."""
+UNFIT = {
+    "parcels_overlap": "Parcels overlap at {n} places, {value:,.0f} m² in all: mend their "
+    "outlines.",
+    "hole_between_parcels": "{value:,.0f} m² at {n} places between parcels belong to none: close "
+    "the gaps.",
+    "parcel_lost": "{n} parcels are too small or too narrow to be parcels: leave them out.",
+    "parcel_in_pieces": "{n} parcels are in several pieces or cross themselves: make each piece a "
+    "parcel.",
+    "street_off_boundaries": "About {value:,.0f} m of streets run along no parcel boundary: split "
+    "the parcels that they cross.",
+}
+"""Why layers are not taken over, by the code of the issue of putting them together."""
 
 
 def adopt(
@@ -73,7 +79,7 @@ def adopt(
         )
     except BoundaryError as error:
         raise EditError(error.problems) from error
-    unfit = [issue.message for issue in drawn.issues if issue.code in UNFIT]
+    unfit = _unfit(drawn.issues)
     if unfit:
         raise EditError(unfit)
     _check_land(before, drawn, snap)
@@ -107,6 +113,16 @@ def _with_edges(before: Layout, drawn: Layout, snap: float) -> Layout:
         land_uses=before.land_uses,
         issues=before.issues,
     )
+
+
+def _unfit(issues: Sequence[Issue]) -> list[str]:
+    """What stands against taking layers over, one sentence for each kind."""
+    problems = []
+    for code, sentence in UNFIT.items():
+        found = [issue.value or 0.0 for issue in issues if issue.code == code]
+        if found:
+            problems.append(sentence.format(n=len(found), value=sum(found)))
+    return problems
 
 
 def _check_land(before: Layout, drawn: Layout, snap: float) -> None:

@@ -25,6 +25,8 @@ from urban_processing.session.reading import (
     Place,
     Rings,
     flag,
+    land_use,
+    land_use_or_none,
     lines,
     number_or_none,
     parcel,
@@ -32,8 +34,8 @@ from urban_processing.session.reading import (
     place,
     points,
     polygons,
+    street_width,
     text,
-    text_or_none,
     tolerance,
     whole,
 )
@@ -91,7 +93,8 @@ class TakeStep(Edit):
     def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
         """Lay out the next level."""
         if moment.state.finished:
-            raise EditError("No parcel is left that the next level could cut: finish the layout.")
+            further = "" if moment.state.completed else ": finish the layout"
+            raise EditError(f"No parcel is left that the next level could cut{further}.")
         progress.update(0.0, f"Level {moment.state.level + 1}")
         after = levels.step(moment.state)
         return after, f"Level {after.level}: {after.layout.mesh.n_faces:,} parcels"
@@ -143,7 +146,7 @@ class Lock(Edit):
     """Keep a parcel as it is, for a use."""
 
     parcel: int | Place = field(metadata=_by(parcel))
-    land_use: str = field(default=PARK, metadata=_by(text))
+    land_use: str = field(default=PARK, metadata=_by(land_use))
     name: ClassVar[str] = "lock"
     grows_streets: ClassVar[bool] = False
 
@@ -170,7 +173,7 @@ class Merge(Edit):
     """Make neighbours one parcel that is not cut any more."""
 
     parcels: tuple[int | Place, ...] = field(metadata=_by(parcels))
-    land_use: str | None = field(default=None, metadata=_by(text_or_none))
+    land_use: str | None = field(default=None, metadata=_by(land_use_or_none))
     name: ClassVar[str] = "merge"
 
     def done(self, moment: Moment) -> tuple[State, str]:
@@ -186,7 +189,7 @@ class AddStreet(Edit):
     line: tuple[Place, ...] = field(metadata=_by(points))
     follow: bool = field(default=False, metadata=_by(flag))
     street_class: str = field(default="", metadata=_by(text))
-    width: float | None = field(default=None, metadata=_by(number_or_none))
+    width: float | None = field(default=None, metadata=_by(street_width))
     snap: float | None = field(default=None, metadata=_by(number_or_none))
     name: ClassVar[str] = "add_street"
 

@@ -242,7 +242,9 @@ def read(path: str | PathLike[str]) -> Saved:
         content = json.loads(source.read_text("utf-8-sig"))  # some editors write a mark first
     except FileNotFoundError:
         raise EditError(f"The file {source} does not exist.") from None
-    except (OSError, UnicodeDecodeError, RecursionError) as error:
+    except UnicodeDecodeError:
+        raise EditError(f"{source} is no text: give a JSON file of edits.") from None
+    except (OSError, RecursionError) as error:
         raise EditError(f"{source} cannot be read: {error}") from error
     except json.JSONDecodeError as error:
         raise EditError(

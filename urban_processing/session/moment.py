@@ -14,6 +14,7 @@ from urban_processing.layout import Stage
 from urban_processing.mesh.planar import FloatArray
 from urban_processing.pipelines.levels import State
 from urban_processing.session.model import Candidate
+from urban_processing.session.wording import parcels_named
 
 PARTS_OF_CUT = (0, 1)
 """Ranks of the halves of a cut parcel among its parts, as `hashing.child` counts them."""
@@ -95,7 +96,13 @@ class Moment:
     def _unknown(self, parcel: int) -> str:
         lineage = next((key for key, number in self.known.items() if number == parcel), None)
         if lineage is None:
-            return f"There is no parcel {parcel}."
+            verb = "is" if len(self.parcels) == 1 else "are"
+            return f"There is no parcel {parcel}; now there {verb} {parcels_named(self.parcels)}."
+        for whole, number in zip(
+            self.state.layout.face_lineage.tolist(), self.parcels, strict=True
+        ):
+            if lineage in (child(whole, rank) for rank in PARTS_OF_CUT):
+                return f"Parcel {parcel} is no more: it is part of parcel {number} again."
         halves = [self.known.get(child(lineage, rank)) for rank in PARTS_OF_CUT]
         if None in halves:
             return f"Parcel {parcel} is no more: it was merged with others, or divided anew."

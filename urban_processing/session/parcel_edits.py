@@ -124,9 +124,7 @@ def _as_before(moment: Moment, lineage: int, faces: Sequence[int]) -> tuple[Stag
 
 def lock(moment: Moment, face: int, land_use: str) -> Edited:
     """Keep a parcel as it is, for a use such as a park."""
-    use = land_use.strip()
-    if not use:
-        raise EditError("A locked parcel needs a land use, such as park.")
+    use = land_use
     state, layout = moment.state, moment.state.layout
     uses = layout.land_uses if use in layout.land_uses else (*layout.land_uses, use)
     if layout.face_locked[face] and layout.face_use[face] == uses.index(use):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 import shapely
@@ -12,12 +12,19 @@ import shapely
 from urban_processing.errors import EditError
 from urban_processing.params.optimize import LARGEST_SNAP
 
+WIDEST_STREET = 1000.0
+"""No right-of-way is wider than this, in metres."""
+
+LONGEST_USE = 100
+"""Letters that the name of a land use has at most."""
+
 LARGEST = 1e9
 """No distance on the map is as large, in metres."""
 
 MIN_RING = 3
 """Places that a ring has at least."""
 
+V = TypeVar("V")
 Place = tuple[float, float]
 Rings = tuple[tuple[Place, ...], ...]
 """The shell of a polygon, and its holes."""
@@ -51,20 +58,42 @@ def tolerance(value: Any) -> float:
     return metres
 
 
+def street_width(value: Any) -> float | None:
+    """Width of a right-of-way in metres, or nothing."""
+    width = number_or_none(value)
+    if width is not None and width > WIDEST_STREET:
+        raise EditError(f"must be at most {WIDEST_STREET:g} m; it is {width:g}.")
+    return width
+
+
+def land_use(value: Any) -> str:
+    """A land use: one short line."""
+    use = text(value).strip()
+    if not use:
+        raise EditError("must name a use, such as park; it is empty.")
+    if len(use) > LONGEST_USE or not use.isprintable():
+        raise EditError(f"must be one line of at most {LONGEST_USE} letters.")
+    return use
+
+
+def land_use_or_none(value: Any) -> str | None:
+    """A land use, or nothing."""
+    return None if value is None else land_use(value)
+
+
+def named(what: str, reader: Callable[[Any], V], value: Any) -> V:
+    """Read a value; what is wrong with it is said with its name."""
+    try:
+        return reader(value)
+    except EditError as error:
+        raise EditError(f"{what} {problem}" for problem in error.problems) from error
+
+
 def text(value: Any) -> str:
     """A text."""
     if not isinstance(value, str):
         raise EditError(f"must be a text; it is {value!r}.")
     return value
-
-
-def text_or_none(value: Any) -> str | None:
-    """A text that says something, or nothing."""
-    if value is None:
-        return None
-    if not text(value).strip():
-        raise EditError("must say something; it is empty.")
-    return text(value).strip()
 
 
 def flag(value: Any) -> bool:
@@ -116,6 +145,7 @@ def _parts(value: Any) -> list[Any]:
 
 
 def _several(value: Any) -> Iterable[Any]:
+    value = getattr(value, "geometry", value)  # a GeoDataFrame is that of its geometries
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise EditError(f"must be a list; it is {value!r}.")
     return value
@@ -146,6 +176,6 @@ def _coordinates(value: Any) -> np.ndarray:
         xy = np.asarray(list(value), dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         xy = np.full(1, math.nan)
-    if not np.isfinite(xy).all():
-        raise EditError("must be finite coordinates.")
+    if not (np.abs(xy) <= LARGEST).all():  # nor are they where they are no numbers
+        raise EditError("must be coordinates of the map, in numbers.")
     return np.asarray(xy)

@@ -28,6 +28,7 @@ from urban_processing.session.model import Candidate, Change
 from urban_processing.session.moment import Moment, first_moment
 from urban_processing.session.parcel_edits import cuts_of
 from urban_processing.session.places import face_of, local
+from urban_processing.session.reading import named
 from urban_processing.session.reading import parcel as read_parcel
 from urban_processing.session.reading import place as read_place
 from urban_processing.site import Site
@@ -161,7 +162,7 @@ class Session(History):
     def parcel_at(self, place: Place) -> int | None:
         """Number of the parcel at a place; None where there is none."""
         moment = self._moment
-        face = moment.face_at(local(moment, (read_place(place),))[0])
+        face = moment.face_at(local(moment, (named("A place", read_place, place),))[0])
         return None if face is None else moment.number(face)
 
     def candidates(self, parcel: int | Place) -> tuple[Candidate, ...]:
@@ -171,7 +172,7 @@ class Session(History):
         neighbour's cut of the same level ends.
         """
         moment = self._moment
-        return cuts_of(moment, face_of(moment, read_parcel(parcel)))
+        return cuts_of(moment, face_of(moment, named("A parcel", read_parcel, parcel)))
 
     # edits
 
