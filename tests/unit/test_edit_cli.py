@@ -152,10 +152,8 @@ def test_an_edit_that_cannot_be_done_ends_the_run(stage: Path, tmp_path: Path) -
     out.write_bytes(b"before")
     result = _edit(stage, edits, "-o", out, "--overwrite")
     said = _problem(result, 1)
-    assert (
-        said
-        == f"{edits}, edit 2 (lock): There is no parcel 77; now there are 8 parcels, such as 5, 6, 7, 8, 9 and 10."
-    )
+    there = "now there are 8 parcels, such as 5, 6, 7, 8, 9 and 10."
+    assert said == f"{edits}, edit 2 (lock): There is no parcel 77; {there}"
     assert out.read_bytes() == b"before"
 
 
