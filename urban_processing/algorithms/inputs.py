@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from urban_processing.algorithms.spec import Input, InputKind
+from urban_processing.params.resume import PARCEL_LAYER
 
 GROUND = (
     Input(
@@ -54,3 +55,21 @@ GROUND = (
     ),
 )
 """What may be given besides land, and becomes a part of its `Site`."""
+
+LAYERS_OF_LAYOUT = (
+    Input(
+        name=PARCEL_LAYER,
+        kind=InputKind.PARCEL_LAYER,
+        label="Parcels",
+        help="Instead of a layout file: polygons of parcels.",
+        required=False,
+    ),
+    Input(
+        name="street_layer",
+        kind=InputKind.STREET_LAYER,
+        label="Streets",
+        help="With the parcels: centrelines of streets, along parcel boundaries.",
+        required=False,
+    ),
+)
+"""Two layers that may be given in place of a layout file."""

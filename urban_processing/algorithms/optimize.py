@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from urban_processing.algorithms.inputs import LAYERS_OF_LAYOUT
 from urban_processing.algorithms.outputs import LAYOUT_OUTPUTS
 from urban_processing.algorithms.spec import AlgorithmSpec, Input, InputKind
 from urban_processing.params.optimize import OptimizeParams
@@ -43,20 +44,7 @@ OPTIMIZE = AlgorithmSpec(
             help="A layout file; its parcels and streets may have been edited.",
             required=False,
         ),
-        Input(
-            name="parcel_layer",
-            kind=InputKind.PARCEL_LAYER,
-            label="Parcels",
-            help="Instead of a layout file: polygons of parcels.",
-            required=False,
-        ),
-        Input(
-            name="street_layer",
-            kind=InputKind.STREET_LAYER,
-            label="Streets",
-            help="With the parcels: centrelines of streets, along parcel boundaries.",
-            required=False,
-        ),
+        *LAYERS_OF_LAYOUT,
     ),
     outputs=LAYOUT_OUTPUTS,
     run=_run,
