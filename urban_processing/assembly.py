@@ -34,7 +34,7 @@ from urban_processing.mesh.coverage import Coverage, fit_together
 from urban_processing.mesh.places import are_near, line_segments
 from urban_processing.mesh.planar import OUTSIDE, BoolArray, FloatArray, IntArray, PlanarMesh
 from urban_processing.provenance import Step
-from urban_processing.site import Frame, Issue
+from urban_processing.site import AREA_ROUNDING, Frame, Issue
 from urban_processing.street_rules import StreetRules
 
 ObjectArray = npt.NDArray[np.object_]
@@ -246,6 +246,28 @@ def _steering(mesh: PlanarMesh, kept: Kept, snap: float) -> npt.NDArray[np.uint8
 def _still_holds(issue: Issue) -> bool:
     """Whether an issue of the layout before is one of the land as a whole, however it is edited."""
     return issue.parcel_id is issue.part is issue.geometry is None and issue.code not in OF_AN_EDIT
+
+
+def land_changes(before: shapely.Geometry, layout: Layout, snap: float) -> tuple[float, float]:
+    """Area in m² of land that no parcel covers any more, and of parcels beside the land.
+
+    Zero where it is no more than what snapping may move along the land's rims.
+
+    Parameters
+    ----------
+    before
+        The land as it was, in local coordinates.
+    layout
+        The layout after an edit.
+    snap
+        Metres within which its parcels were fitted together.
+    """
+    now = shapely.coverage_union_all(layout.mesh.face_polygons())
+    slack = snap * before.length + AREA_ROUNDING * before.area
+    missing, more = (
+        float(shapely.difference(one, other).area) for one, other in ((before, now), (now, before))
+    )
+    return missing if missing > slack else 0.0, more if more > slack else 0.0
 
 
 def _parts(mesh: PlanarMesh) -> IntArray:

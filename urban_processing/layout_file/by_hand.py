@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import shapely
 
-from urban_processing.assembly import EDITED
+from urban_processing.assembly import EDITED, land_changes
 from urban_processing.errors import BoundaryError
 from urban_processing.layout import Layout, Stage, Steering
 from urban_processing.schema import BOUNDARY, PARCELS, STREETS
-from urban_processing.site import AREA_ROUNDING, Issue
+from urban_processing.site import Issue
 
 PRECISION = 100.0
 """Places of streets are kept to so many parts of a metre."""
@@ -103,15 +103,15 @@ def barred_where_deleted(layout: Layout, state: Mapping[str, Any], snap: float) 
 def land_note(layout: Layout, land: Sequence[shapely.Polygon], snap: float) -> list[Issue]:
     """Say that parcels cover other land than before, if they do; `land` is in local coordinates."""
     before = shapely.union_all(land)
-    now = shapely.coverage_union_all(layout.mesh.face_polygons())
-    slack = snap * before.length + AREA_ROUNDING * before.area
-    missing, more = shapely.difference(before, now).area, shapely.difference(now, before).area
+    if before.is_empty:
+        return []
+    missing, more = land_changes(before, layout, snap)
     said = [
         f"{area:,.0f} m² of {what}"
         for area, what in ((missing, "it belong to no parcel now"), (more, "parcels lie outside"))
-        if area > slack
+        if area
     ]
-    if not said or before.is_empty:
+    if not said:
         return []
     message = f"The land is not what it was: {' and '.join(said)}."
-    return [Issue(LAND_CHANGED, message, value=float(missing + more))]
+    return [Issue(LAND_CHANGED, message, value=missing + more)]

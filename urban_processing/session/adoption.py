@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from urban_processing.assembly import assemble_layout, kept_of
+from urban_processing.assembly import assemble_layout, kept_of, land_changes
 from urban_processing.errors import BoundaryError, EditError
 from urban_processing.hashing import child
 from urban_processing.layout import (
@@ -25,7 +25,7 @@ from urban_processing.mesh.planar import IntArray
 from urban_processing.pipelines.hand_edits import ParcelMatch, match_parcels
 from urban_processing.pipelines.levels import State
 from urban_processing.session.moment import PARTS_OF_CUT, Moment
-from urban_processing.site import AREA_ROUNDING, Issue
+from urban_processing.site import Issue
 
 Geometries = npt.NDArray[np.object_]
 
@@ -127,16 +127,13 @@ def _unfit(issues: Sequence[Issue]) -> list[str]:
 
 def _check_land(before: Layout, drawn: Layout, snap: float) -> None:
     """Raise `EditError` unless the parcels cover the land that there was."""
-    old, new = (
-        shapely.coverage_union_all(layout.mesh.face_polygons()) for layout in (before, drawn)
-    )
-    slack = snap * old.length + AREA_ROUNDING * old.area
-    missing, more = shapely.difference(old, new).area, shapely.difference(new, old).area
-    if missing > slack:
+    land = shapely.coverage_union_all(before.mesh.face_polygons())
+    missing, more = land_changes(land, drawn, snap)
+    if missing:
         raise EditError(
             f"{missing:,.0f} m² of the land belong to no parcel: give the layer of all parcels."
         )
-    if more > slack:
+    if more:
         raise EditError(f"Parcels reach {more:,.0f} m² beyond the land: cut them at its rim.")
 
 

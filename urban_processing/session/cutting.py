@@ -19,7 +19,7 @@ from urban_processing.quotas import divided
 from urban_processing.session.drawn_line import SAME_PLACE, as_line, as_points
 from urban_processing.session.moment import Moment
 from urban_processing.session.spots import Spot, spot_on, with_vertices
-from urban_processing.session.wording import areas_named, locked_as, parcels_named
+from urban_processing.session.wording import areas_named, beginning, locked_as, parcels_named
 from urban_processing.site import AREA_ROUNDING, snap_to_grid
 from urban_processing.subdivision.insert import (
     LEAST_CLEARANCE,
@@ -179,7 +179,7 @@ def check_large_enough(moment: Moment, faces: Sequence[int]) -> None:
     too = "is too small" if len(small) == 1 else "are too small"
     size = f" ({area[small[0]]:,.0f} m²)" if len(small) == 1 else ""
     raise EditError(
-        f"{named[0].upper()}{named[1:]}{size} {too} to be cut in two: the smallest parcel "
+        f"{beginning(named)}{size} {too} to be cut in two: the smallest parcel "
         f"allowed is {least:,.0f} m²."
     )
 

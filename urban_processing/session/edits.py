@@ -17,7 +17,7 @@ from urban_processing.pipelines import levels
 from urban_processing.pipelines.cogenerate import go_on
 from urban_processing.pipelines.levels import State
 from urban_processing.pipelines.stops import BLOCKS_DIVIDED, LEVEL
-from urban_processing.progress import SILENT, Progress
+from urban_processing.progress import Progress
 from urban_processing.session import adoption, parcel_edits, street_edits
 from urban_processing.session.moment import Moment
 from urban_processing.session.places import LEAST_SNAP, face_of, local, reach_of, snap_of
@@ -52,14 +52,9 @@ class Edit(abc.ABC):
     grows_streets: ClassVar[bool] = True
     """Whether the streets that the parcels then need are laid, and the requirements checked."""
 
+    @abc.abstractmethod
     def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
         """Return the state after the edit, and what was done; `EditError` where it cannot be."""
-        del progress  # most edits take no time
-        return self.done(moment)
-
-    @abc.abstractmethod
-    def done(self, moment: Moment) -> tuple[State, str]:
-        """Return the state after an edit that takes no time, and what was done."""
 
     def told(self) -> dict[str, Any]:
         """Return what provenance tells of the edit."""
@@ -75,6 +70,19 @@ class Edit(abc.ABC):
         return values
 
 
+class PromptEdit(Edit):
+    """An edit that takes no time worth telling of."""
+
+    def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
+        """Do it."""
+        del progress
+        return self.done(moment)
+
+    @abc.abstractmethod
+    def done(self, moment: Moment) -> tuple[State, str]:
+        """Return the state after the edit, and what was done; `EditError` where it cannot be."""
+
+
 def _by(reader: Callable[[Any], Any]) -> Mapping[str, Any]:
     return {"reader": reader}
 
@@ -85,10 +93,6 @@ class TakeStep(Edit):
 
     name: ClassVar[str] = "step"
     grows_streets: ClassVar[bool] = False
-
-    def done(self, moment: Moment) -> tuple[State, str]:
-        """Do it without telling how far it is."""
-        return self.apply(moment, SILENT)
 
     def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
         """Lay out the next level."""
@@ -101,7 +105,7 @@ class TakeStep(Edit):
 
 
 @dataclass(frozen=True)
-class Choose(Edit):
+class Choose(PromptEdit):
     """Cut a parcel by one of its candidates."""
 
     parcel: int | Place = field(metadata=_by(parcel))
@@ -114,7 +118,7 @@ class Choose(Edit):
 
 
 @dataclass(frozen=True)
-class Cut(Edit):
+class Cut(PromptEdit):
     """Cut a parcel along a drawn line."""
 
     parcel: int | Place = field(metadata=_by(parcel))
@@ -130,7 +134,7 @@ class Cut(Edit):
 
 
 @dataclass(frozen=True)
-class UndoCut(Edit):
+class UndoCut(PromptEdit):
     """Make one parcel again of all that came of the cut that a parcel came of."""
 
     parcel: int | Place = field(metadata=_by(parcel))
@@ -142,7 +146,7 @@ class UndoCut(Edit):
 
 
 @dataclass(frozen=True)
-class Lock(Edit):
+class Lock(PromptEdit):
     """Keep a parcel as it is, for a use."""
 
     parcel: int | Place = field(metadata=_by(parcel))
@@ -156,7 +160,7 @@ class Lock(Edit):
 
 
 @dataclass(frozen=True)
-class Unlock(Edit):
+class Unlock(PromptEdit):
     """Let a locked parcel be one like any other."""
 
     parcel: int | Place = field(metadata=_by(parcel))
@@ -169,7 +173,7 @@ class Unlock(Edit):
 
 
 @dataclass(frozen=True)
-class Merge(Edit):
+class Merge(PromptEdit):
     """Make neighbours one parcel that is not cut any more."""
 
     parcels: tuple[int | Place, ...] = field(metadata=_by(parcels))
@@ -183,7 +187,7 @@ class Merge(Edit):
 
 
 @dataclass(frozen=True)
-class AddStreet(Edit):
+class AddStreet(PromptEdit):
     """Lay a street along a drawn line, or along parcel boundaries from point to point."""
 
     line: tuple[Place, ...] = field(metadata=_by(points))
@@ -207,7 +211,7 @@ class AddStreet(Edit):
 
 
 @dataclass(frozen=True)
-class RemoveStreet(Edit):
+class RemoveStreet(PromptEdit):
     """Take away the street at a place, from junction to junction."""
 
     place: Place = field(metadata=_by(place))
@@ -221,7 +225,7 @@ class RemoveStreet(Edit):
 
 
 @dataclass(frozen=True)
-class Adopt(Edit):
+class Adopt(PromptEdit):
     """Take over parcels and streets that were edited by hand."""
 
     parcels: tuple[Rings, ...] = field(metadata=_by(polygons))
@@ -255,10 +259,6 @@ class Finish(Edit):
 
     name: ClassVar[str] = "finish"
     grows_streets: ClassVar[bool] = False
-
-    def done(self, moment: Moment) -> tuple[State, str]:
-        """Do it without telling how far it is."""
-        return self.apply(moment, SILENT)
 
     def apply(self, moment: Moment, progress: Progress) -> tuple[State, str]:
         """Finish the layout."""

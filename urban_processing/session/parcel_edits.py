@@ -23,7 +23,7 @@ from urban_processing.session.joining import joined, streets_between
 from urban_processing.session.lineage import descendants, merged, parents
 from urban_processing.session.model import Candidate
 from urban_processing.session.moment import Moment
-from urban_processing.session.wording import locked_as, parcels_named
+from urban_processing.session.wording import beginning, locked_as, parcels_named
 from urban_processing.subdivision.insert import insert_cuts
 from urban_processing.subdivision.parcels import parcel_rings
 from urban_processing.subdivision.short_edges import remove_short_edges
@@ -124,15 +124,12 @@ def _as_before(moment: Moment, lineage: int, faces: Sequence[int]) -> tuple[Stag
 
 def lock(moment: Moment, face: int, land_use: str) -> Edited:
     """Keep a parcel as it is, for a use such as a park."""
-    use = land_use
-    state, layout = moment.state, moment.state.layout
-    uses = layout.land_uses if use in layout.land_uses else (*layout.land_uses, use)
-    if layout.face_locked[face] and layout.face_use[face] == uses.index(use):
-        raise EditError(f"Parcel {moment.number(face)} is {locked_as(use)} already.")
-    after = _with_face(
-        layout.replace(land_uses=uses), face, face_locked=True, face_use=uses.index(use)
-    )
-    sentence = f"Parcel {moment.number(face)} is kept as {use}"
+    state = moment.state
+    layout, use = _with_use(state.layout, land_use)
+    if layout.face_locked[face] and layout.face_use[face] == use:
+        raise EditError(f"Parcel {moment.number(face)} is {locked_as(land_use)} already.")
+    after = _with_face(layout, face, face_locked=True, face_use=use)
+    sentence = f"Parcel {moment.number(face)} is kept as {land_use}"
     return dataclasses.replace(state, layout=after), sentence
 
 
@@ -154,24 +151,24 @@ def merge(moment: Moment, faces: Sequence[int], land_use: str | None) -> Edited:
     faces = sorted(set(faces))
     streets = streets_between(layout, faces)
     if len(streets):
-        a, b = (moment.number(int(f)) for f in layout.mesh.face.reshape(-1, 2)[streets[0]])
+        a, b = _beside(moment, streets[0])
         raise EditError(f"A street runs between parcels {a} and {b}: remove it first.")
     use = _common_use(moment, faces) if land_use is None else land_use
     one, kept = joined(moment, faces)
-    uses = one.land_uses if use in one.land_uses else (*one.land_uses, use)
+    one, number = _with_use(one, use)
     after = _with_face(
-        one.replace(land_uses=uses),
+        one,
         kept,
         face_lineage=merged(layout.face_lineage[faces]),
         face_level=int(layout.face_level[faces].min()),
         face_quota=int(layout.face_quota[faces].sum()),
         face_stage=int(layout.face_stage[faces].max()),
         face_locked=True,
-        face_use=uses.index(use),
+        face_use=number,
     )
     named = parcels_named(moment.number(f) for f in faces)
     what = "not cut unless it is unlocked" if use == PARCEL_USE else f"kept as {use}"
-    sentence = f"{named[0].upper()}{named[1:]} are one now, {what}"
+    sentence = f"{beginning(named)} are one now, {what}"
     return dataclasses.replace(state, layout=after), sentence
 
 
@@ -185,6 +182,20 @@ def _common_use(moment: Moment, faces: Sequence[int]) -> str:
             "they have together."
         )
     return uses.pop() if uses else PARCEL_USE
+
+
+def _with_use(layout: Layout, land_use: str) -> tuple[Layout, int]:
+    """The layout with a land use among its own, and the number that it has there."""
+    uses = layout.land_uses
+    if land_use not in uses:
+        layout = layout.replace(land_uses=(*uses, land_use))
+    return layout, layout.land_uses.index(land_use)
+
+
+def _beside(moment: Moment, edge: int) -> tuple[int, int]:
+    """Numbers of the parcels on both sides of an edge."""
+    left, right = moment.state.layout.mesh.face.reshape(-1, 2)[edge].tolist()
+    return moment.number(left), moment.number(right)
 
 
 def _with_face(layout: Layout, face: int, **values: int | bool) -> Layout:
@@ -212,7 +223,7 @@ def _check_no_given_street(moment: Moment, faces: Sequence[int]) -> None:
     streets = streets_between(layout, faces)
     given = streets[layout.edge_fixed[streets] != NOT_FIXED]
     if len(given):
-        a, b = (moment.number(int(f)) for f in layout.mesh.face.reshape(-1, 2)[given[0]])
+        a, b = _beside(moment, given[0])
         raise EditError(
             f"A street that was given runs between parcels {a} and {b}, which would be one: "
             "remove it first."

@@ -11,7 +11,7 @@ from urban_processing.layout import Layout
 from urban_processing.mesh.components import components
 from urban_processing.mesh.planar import IntArray, linear_rings
 from urban_processing.session.moment import Moment
-from urban_processing.session.wording import parcels_named
+from urban_processing.session.wording import beginning, parcels_named
 from urban_processing.site import AREA_ROUNDING
 
 
@@ -94,7 +94,7 @@ def _unreached(before: Moment, after: Moment) -> list[str]:
     if not len(lost):
         return []
     named = parcels_named(after.number(f) for f in lost.tolist())
-    return [f"{named[0].upper()}{named[1:]} would not be reached by any street."]
+    return [f"{beginning(named)} would not be reached by any street."]
 
 
 def _loose(before: Layout, after: Layout) -> list[str]:

@@ -20,6 +20,11 @@ def parcels_named(numbers: Iterable[int]) -> str:
     return f"{len(names):,} parcels, such as {_listed(names[:NAMED])}"
 
 
+def beginning(words: str) -> str:
+    """Return words as a sentence begins with them."""
+    return words[:1].upper() + words[1:]
+
+
 def locked_as(land_use: str) -> str:
     """Return "locked as park", or "locked" where there is no such use."""
     return "locked" if land_use == PARCEL_USE else f"locked as {land_use}"
